@@ -1,0 +1,1 @@
+"""Recognise and restore vessels from sparse LiDAR clusters."""
