@@ -1,0 +1,55 @@
+"""Every error of the product, each tied to an arrow of the data path; no transport codes in here.
+
+ShipshapeError
+|-- InvalidInput          bytes -> contact: the caller sent something else than was asked for
+|   |-- TooLarge          more bytes, points or contacts than the limits allow
+|   `-- Unprocessable     well-formed, but not a vessel's cluster (NaN, too few points, too wide)
+|-- Overloaded            contact -> executor: the queue is full
+|-- DeadlineExceeded      executor -> stages: the answer would come too late
+|-- Cancelled             executor -> stages: the caller left
+|-- NotReady              the service is starting or stopping
+|-- BundleError           files -> models: the bundle is missing, damaged or of another shape
+`-- FileError             file -> clusters: the file cannot be read
+
+A message is one sentence that says what was expected and what came. It is safe to show to a caller.
+"""
+
+
+class ShipshapeError(Exception):
+    """Base of all errors that Shipshape raises on purpose."""
+
+
+class InvalidInput(ShipshapeError):
+    """The request is not of the promised form."""
+
+
+class TooLarge(InvalidInput):
+    """The request exceeds a limit on bytes, points or contacts."""
+
+
+class Unprocessable(InvalidInput):
+    """The request is well-formed but its points cannot be one vessel's cluster."""
+
+
+class Overloaded(ShipshapeError):
+    """The bounded queue is full; the caller may come back later."""
+
+
+class DeadlineExceeded(ShipshapeError):
+    """The deadline passed before the answer was computed."""
+
+
+class Cancelled(ShipshapeError):
+    """The caller cancelled before the answer was computed."""
+
+
+class NotReady(ShipshapeError):
+    """The service is still warming up, or stopping."""
+
+
+class BundleError(ShipshapeError):
+    """The model bundle is missing, damaged, or not of the shape its manifest promises."""
+
+
+class FileError(ShipshapeError):
+    """A cluster file cannot be read."""

@@ -1,0 +1,114 @@
+"""The values that travel between stages: frozen, float32, SI units, radians; the frame is in the name.
+
+Level frame (origin at the LiDAR)          Vessel frame (origin on the waterline, mid box)
+
+        x ahead of the sensor's vessel             x bow
+        ^                                          ^
+        |                                          |
+ y <----o  z up, towards you                y <----o  z up, z = 0 on the waterline
+ port                                       port
+
+`heading` is the yaw of the vessel frame in the level frame, counter-clockwise from +x, in (-pi, pi].
+`aspect` is the angle from the vessel's bow to the line of sight back to the sensor: 0 bow-on, 90 abeam,
+180 stern-on.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from jaxtyping import Bool, Float32, UInt8
+
+
+class Preset(StrEnum):
+    """Which set of methods the stages use."""
+
+    PAPER = "paper"  # the paper's method to the letter wherever its text defines it
+    BEST = "best"  # what measured best
+
+
+class ImageMethod(StrEnum):
+    """The paper's four image generation methods: {1:1:1, z only} normalisation x {top, side} view."""
+
+    FULL_TOP = "full_top"
+    FULL_SIDE = "full_side"
+    Z_TOP = "z_top"
+    Z_SIDE = "z_side"
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """One vessel to recognise: its cluster in the level frame and what the caller knows beside it."""
+
+    points_level: Float32[np.ndarray, "n 3"]
+    contact_id: str = ""
+    sensor_height: float | None = None  # LiDAR above the water, m; None: the lowest point stands in
+    own_true_heading_deg: float | None = None  # the caller's own bow, clockwise from true north
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceBox:
+    """Outer size of a vessel above the waterline, metres."""
+
+    length: float
+    beam: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Oriented box of the whole vessel; its yaw is the heading. Metres, level frame."""
+
+    center_level: tuple[float, float, float]
+    size: ReferenceBox
+
+
+@dataclass(frozen=True, slots=True)
+class RestoredCloud:
+    """The whole vessel: every measured point as it came, and the inferred ones."""
+
+    points_level: Float32[np.ndarray, "m 3"]
+    measured: Bool[np.ndarray, " m"]
+
+
+@dataclass(frozen=True, slots=True)
+class ImagePair:
+    """The projected image and the inpainted one, B G R = lower, middle, upper layer; 0 is empty."""
+
+    before: UInt8[np.ndarray, "rows columns 3"]
+    after: UInt8[np.ndarray, "rows columns 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """What Shipshape says of one contact."""
+
+    vessel: str  # the most probable vessel of the catalogue, also when `unknown` says it is none of them
+    probability: float
+    probabilities: Mapping[str, float]  # every catalogue vessel and "unknown"; sums to 1
+    unknown: bool  # true: better treated as not in the catalogue
+    heading: float  # rad
+    heading_std: float  # rad, of the heading modulo pi
+    bow_probability: float  # that the bow points along `heading` and not the opposite way
+    aspect_deg: float
+    true_heading_deg: float | None  # clockwise from north; None unless the caller gave its own
+    box: Box
+    restored: RestoredCloud
+    images: ImagePair
+    keypoints_level: Float32[np.ndarray, "k 3"]
+    rung: str  # of the ladder of ever cheaper answers; "full" is the only one so far
+    preset: Preset
+    image_method: ImageMethod | None  # None: the image of preset `best`
+    bundle: str  # digest of the model bundle
+    stage_ms: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def measured_points(self) -> int:
+        """How many points of the restored cloud the sensor measured."""
+        return int(np.count_nonzero(self.restored.measured))
+
+    @property
+    def inferred_points(self) -> int:
+        """How many points of the restored cloud were inferred."""
+        return len(self.restored.measured) - self.measured_points
