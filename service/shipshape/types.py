@@ -48,6 +48,14 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
+class Options:
+    """How a contact is to be computed."""
+
+    preset: Preset = Preset.BEST
+    image_method: ImageMethod = ImageMethod.FULL_SIDE  # used by preset `paper` alone
+
+
+@dataclass(frozen=True, slots=True)
 class ReferenceBox:
     """Outer size of a vessel above the waterline, metres."""
 
