@@ -1,0 +1,177 @@
+"""The model bundle: a folder with manifest.toml and ONNX files, verified before anything is trusted.
+
+format = 1
+name = "default"
+[training]                      # free: commit, seed, ...
+[[catalogue]]                   # in the order of the networks' classes; metres above the waterline
+name = "rhib"; length = 9.0; beam = 2.8; height = 3.5
+[models.prior]
+file = "prior.onnx"; sha256 = "..."
+inputs = [{name = "images", shape = [-1, 5, 16, 32], dtype = "float32"}]
+outputs = [{name = "logits", shape = [-1, 6], dtype = "float32"}]
+[parameters.best]               # free tables that the stages read: temperatures, thresholds, pixel sizes
+[scores]                        # free: what the bundle reached when it was made
+"""
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from shipshape.errors import BundleError
+from shipshape.onnx_model import OnnxModel, Signature, TensorSpec
+from shipshape.types import ReferenceBox
+
+MANIFEST = "manifest.toml"
+FORMAT = 1
+UNKNOWN = "unknown"  # how a recognition calls what is not in the catalogue, so no vessel may be called so
+
+
+@dataclass(frozen=True, slots=True)
+class CatalogueVessel:
+    """One vessel that the bundle was trained to know."""
+
+    name: str
+    box: ReferenceBox
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """Everything the stages need that was learnt or measured; immutable, shared by all workers."""
+
+    name: str
+    digest: str  # sha256 of manifest.toml, which holds the sha256 of every other file
+    catalogue: tuple[CatalogueVessel, ...]
+    models: Mapping[str, OnnxModel]
+    parameters: Mapping[str, Any]
+    scores: Mapping[str, Any]
+    training: Mapping[str, Any]
+
+
+def load_bundle(path: Path) -> Bundle:
+    """The bundle in the folder `path`, every file compared with its sha256 before it is parsed.
+
+    Raises:
+        BundleError: One sentence that says what was expected and what came.
+    """
+    content = _read_manifest(path)
+    spec = _parse_manifest(content)
+    return Bundle(
+        name=spec.name,
+        digest=hashlib.sha256(content).hexdigest(),
+        catalogue=tuple(vessel.to_vessel() for vessel in spec.catalogue),
+        models={name: _load_model(path, model) for name, model in spec.models.items()},
+        parameters=spec.parameters,
+        scores=spec.scores,
+        training=spec.training,
+    )
+
+
+class _Spec(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class _TensorEntry(_Spec):
+    name: str
+    shape: list[Annotated[int, Field(ge=-1)]]
+    dtype: str
+
+    def to_spec(self) -> TensorSpec:
+        return TensorSpec(self.name, tuple(self.shape), self.dtype)
+
+
+class _ModelEntry(_Spec):
+    file: Annotated[
+        str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9._-]*$")
+    ]  # a plain name cannot leave the folder
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    inputs: list[_TensorEntry]
+    outputs: list[_TensorEntry]
+
+    def to_signature(self) -> Signature:
+        return Signature(
+            inputs=tuple(entry.to_spec() for entry in self.inputs),
+            outputs=tuple(entry.to_spec() for entry in self.outputs),
+        )
+
+
+_Metres = Annotated[float, Field(gt=0, le=1000)]
+
+
+class _VesselEntry(_Spec):
+    name: Annotated[str, Field(min_length=1)]
+    length: _Metres
+    beam: _Metres
+    height: _Metres
+
+    def to_vessel(self) -> CatalogueVessel:
+        return CatalogueVessel(self.name, ReferenceBox(self.length, self.beam, self.height))
+
+
+class _ManifestSpec(_Spec):
+    format: Literal[1]
+    name: Annotated[str, Field(min_length=1)]
+    catalogue: Annotated[list[_VesselEntry], Field(min_length=1)]
+    models: dict[str, _ModelEntry]
+    training: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
+    scores: dict[str, Any] = {}
+
+
+def _read_manifest(folder: Path) -> bytes:
+    if not folder.is_dir():
+        raise BundleError(
+            f"expected a bundle folder at {folder}, got {'a file' if folder.exists() else 'nothing'}"
+        )
+    try:
+        return (folder / MANIFEST).read_bytes()
+    except OSError as error:
+        raise BundleError(f"expected to read {MANIFEST} in {folder}, got: {error.strerror}") from error
+
+
+def _parse_manifest(content: bytes) -> _ManifestSpec:
+    try:
+        table = tomllib.loads(content.decode())
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise BundleError(f"expected {MANIFEST} to be TOML, got: {error}") from error
+    # Before everything else: a later format may differ in anything but this line.
+    if table.get("format") != FORMAT:
+        raise BundleError(
+            f"expected {MANIFEST} of format {FORMAT}, got format {table.get('format', '(none)')}"
+        )
+    try:
+        spec = _ManifestSpec.model_validate(table)
+    except ValidationError as error:
+        raise BundleError(_first_complaint(error)) from error
+    _check_names([vessel.name for vessel in spec.catalogue])
+    return spec
+
+
+def _first_complaint(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    where = ".".join(map(str, first["loc"]))
+    if first["type"] == "missing":
+        return f"expected the key {where} in {MANIFEST}, got none"
+    return f"expected another value of {where} in {MANIFEST}, got {first['input']!r:.80}: {first['msg']}"
+
+
+def _check_names(names: list[str]) -> None:
+    if len(set(names)) != len(names) or UNKNOWN in names:
+        raise BundleError(
+            f"expected distinct catalogue names other than {UNKNOWN!r} in {MANIFEST}, got {', '.join(names)}"
+        )
+
+
+def _load_model(folder: Path, entry: _ModelEntry) -> OnnxModel:
+    try:
+        content = (folder / entry.file).read_bytes()
+    except OSError as error:
+        raise BundleError(f"expected to read {entry.file} in {folder}, got: {error.strerror}") from error
+    digest = hashlib.sha256(content).hexdigest()
+    if digest != entry.sha256:
+        raise BundleError(f"expected sha256 {entry.sha256} of {entry.file}, got {digest}")
+    return OnnxModel(content, entry.to_signature(), label=entry.file)
