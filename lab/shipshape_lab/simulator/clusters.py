@@ -1,0 +1,135 @@
+"""Files of clusters and of complete surfaces: plain arrays in .npz, nothing pickled.
+
+A cluster set holds M clusters one behind the other in `points`; `n` says how many points each has.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import numpy as np
+
+from shipshape_lab.simulator.scan import Scan
+
+NOMINAL_SEED = -1
+
+
+@dataclass(frozen=True)
+class ClusterSet:
+    """M clusters with their truth; metres and radians, level frame.
+
+    Attributes:
+        points: all clusters' points, shape (sum of n, 3), float32.
+        n: points of each cluster, shape (M,), int32.
+        label: index into `classes`, shape (M,), int32.
+        classes: type names, unicode.
+        heading: yaw of the vessel, counter-clockwise, shape (M,), float64.
+        range_m: horizontal distance to the vessel's origin, shape (M,), float64.
+        bearing: direction of the vessel's origin, shape (M,), float64.
+        aspect_deg: 0 bow-on to 180 stern-on, degrees, shape (M,), float64.
+        sensor_height: height of the sensor above the waterline, shape (M,), float64.
+        hull_seed: seed of the hull's variation, -1 for the nominal hull, shape (M,), int64.
+        T_level_vessel: pose of the vessel, shape (M, 4, 4), float64.
+        lidar: name of the sensor, unicode, shape (M,).
+        seed: seed of the whole set, a scalar.
+    """
+
+    points: np.ndarray
+    n: np.ndarray
+    label: np.ndarray
+    classes: np.ndarray
+    heading: np.ndarray
+    range_m: np.ndarray
+    bearing: np.ndarray
+    aspect_deg: np.ndarray
+    sensor_height: np.ndarray
+    hull_seed: np.ndarray
+    T_level_vessel: np.ndarray
+    lidar: np.ndarray
+    seed: np.ndarray
+    starts: np.ndarray = field(init=False, repr=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "starts", np.concatenate([[0], np.cumsum(self.n, dtype=np.int64)]))
+
+    def __len__(self) -> int:
+        return len(self.n)
+
+    def cluster(self, i: int) -> np.ndarray:
+        """Points of cluster i in the level frame, shape (n[i], 3), float32."""
+        i = range(len(self))[i]
+        return self.points[self.starts[i] : self.starts[i + 1]]
+
+    def name(self, i: int) -> str:
+        """Type name of cluster i."""
+        return str(self.classes[self.label[i]])
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Outer surfaces of H hulls: type names and seeds (H,), points (H, S, 3) in the vessel frame, float32."""
+
+    name: np.ndarray
+    hull_seed: np.ndarray
+    points: np.ndarray
+
+    def index(self) -> dict[tuple[str, int], int]:
+        """Row of each (type name, hull seed)."""
+        return {(str(n), int(s)): i for i, (n, s) in enumerate(zip(self.name, self.hull_seed, strict=True))}
+
+
+def collect(scans: Sequence[tuple[Scan, str]], classes: Sequence[str], seed: int) -> ClusterSet:
+    """Packs scans, each with the name of its sensor, into one set; `classes` fixes the labels."""
+    found = [scan for scan, _ in scans]
+    seeds = [NOMINAL_SEED if scan.vessel_seed is None else scan.vessel_seed for scan in found]
+    return ClusterSet(
+        points=np.concatenate([np.zeros((0, 3), np.float32), *(scan.points_level for scan in found)]),
+        n=np.array([len(scan.points_level) for scan in found], np.int32),
+        label=np.array([list(classes).index(scan.vessel_name) for scan in found], np.int32),
+        classes=np.array(classes),
+        heading=np.array([scan.heading for scan in found]),
+        range_m=np.array([scan.range_m for scan in found]),
+        bearing=np.array([scan.bearing for scan in found]),
+        aspect_deg=np.array([scan.aspect_deg for scan in found]),
+        sensor_height=np.array([scan.sensor_height for scan in found]),
+        hull_seed=np.array(seeds, np.int64),
+        T_level_vessel=np.array([scan.T_level_vessel for scan in found]).reshape(-1, 4, 4),
+        lidar=np.array([name for _, name in scans], dtype="U16"),
+        seed=np.array(seed, np.int64),
+    )
+
+
+def save(path: Path, content: ClusterSet | Surfaces) -> None:
+    """Writes a set to `path`; a reader never sees half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.stem}.{os.getpid()}.npz")
+    np.savez(draft, **{f.name: getattr(content, f.name) for f in fields(content) if f.init})
+    draft.replace(path)
+
+
+def load(path: str | Path) -> ClusterSet:
+    """Reads a cluster set.
+
+    Raises:
+        ValueError: if the file is not a cluster set.
+    """
+    return _read(ClusterSet, path)
+
+
+def load_surfaces(path: str | Path) -> Surfaces:
+    """Reads complete surfaces.
+
+    Raises:
+        ValueError: if the file holds no surfaces.
+    """
+    return _read(Surfaces, path)
+
+
+def _read(kind, path: str | Path):
+    names = [f.name for f in fields(kind) if f.init]
+    with np.load(path, allow_pickle=False) as arrays:
+        missing = sorted(set(names) - set(arrays.files))
+        if missing:
+            raise ValueError(f"{path} must hold the arrays of a {kind.__name__}, but lacks {missing}")
+        return kind(**{name: arrays[name] for name in names})

@@ -1,0 +1,185 @@
+"""Makes the data sets: random sets for training, validation and the hard test, and the paper grid P.
+
+Every cluster has its own random stream, the set's seed sequence with the cluster's number as its spawn key, so
+a set is the same whatever the number of processes.
+
+Example:
+    python -m shipshape_lab.simulator.datasets train --out runs/data --count 20000 --seed 1 --jobs 2
+"""
+
+import argparse
+import hashlib
+import multiprocessing
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from shipshape_lab.simulator import recipes
+from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, collect, load, load_surfaces, save
+from shipshape_lab.simulator.scan import Scan, scan_vessel
+from shipshape_lab.simulator.sensor import DEFAULT_LIDAR
+from shipshape_lab.simulator.surface import sample_surface
+from shipshape_lab.simulator.vessels import CATALOGUE, VESSEL_TYPES, build_vessel
+
+__all__ = ["CLASSES", "Job", "load", "load_surfaces", "main", "make", "make_surfaces"]
+
+CLASSES = (*CATALOGUE, *(name for name in VESSEL_TYPES if name not in CATALOGUE))
+MIN_POINTS = 10
+MAX_DRAWS = 1000
+SURFACE_POINTS = 20_000
+COUNTS = {"train": 20_000, "validation": 4_000, "H": 5_000, "P": len(recipes.grid_cells(CATALOGUE))}
+SEEDS = {"train": 1, "validation": 2, "P": 3, "H": 4}
+
+hull = cache(build_vessel)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One set to make: its name, how many clusters, and the seed behind all of its chance."""
+
+    name: str
+    count: int
+    seed: int
+
+    def rng(self, i: int) -> np.random.Generator:
+        """The random stream of cluster i alone."""
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(i,)))
+
+
+def random_cluster(job: Job, i: int) -> tuple[Scan, str]:
+    """Cluster i of a random set; the type stays, all else is drawn again until there are enough points."""
+    recipe, rng = recipes.RECIPES[job.name], job.rng(i)
+    name = _draw_type(recipe, rng)
+    for _ in range(MAX_DRAWS):
+        vessel = hull(name, int(rng.choice(recipe.hulls)))
+        lidar, placement = recipes.draw_lidar(rng), recipes.draw_placement(recipe, rng)
+        conditions = recipes.draw_conditions(recipe, placement, vessel.box[0], rng)
+        scan = scan_vessel(vessel, lidar, placement=placement, conditions=conditions, rng=rng)
+        if len(scan.points_level) >= MIN_POINTS:
+            return scan, lidar.name
+    raise ValueError(f"a {name} must show {MIN_POINTS} points within {MAX_DRAWS} draws, but never did")
+
+
+def _draw_type(recipe: recipes.Recipe, rng: np.random.Generator) -> str:
+    listed = rng.random() < recipe.catalogue_share
+    return str(rng.choice(CATALOGUE if listed else CLASSES[len(CATALOGUE) :]))
+
+
+def grid_cluster(job: Job, i: int) -> tuple[Scan, str]:
+    """Cell i of the paper grid, however few its points."""
+    name, distance, heading_deg = recipes.grid_cells(CATALOGUE)[i]
+    vessel = hull(name, grid_hull(name, distance, heading_deg))
+    placement = recipes.grid_placement(distance, heading_deg)
+    return scan_vessel(vessel, DEFAULT_LIDAR, placement=placement, rng=job.rng(i)), DEFAULT_LIDAR.name
+
+
+def grid_hull(name: str, distance: int, heading_deg: int) -> int:
+    """Test hull of a cell, spread evenly and the same everywhere (SHA-256 of its coordinates)."""
+    digest = hashlib.sha256(f"{name}/{distance}/{heading_deg}".encode()).digest()
+    return recipes.TEST_HULLS[int.from_bytes(digest[:8], "big") % len(recipes.TEST_HULLS)]
+
+
+def make(job: Job, *, jobs: int = 1, progress: bool = True) -> ClusterSet:
+    """Makes a set.
+
+    Args:
+        job: what to make.
+        jobs: processes to share the work; the result does not depend on it.
+        progress: whether to show a bar.
+
+    Returns:
+        The set, clusters in order.
+    """
+    cluster = partial(grid_cluster if job.name == "P" else random_cluster, job)
+    return collect(
+        _spread(cluster, range(job.count), jobs, job.name if progress else None), CLASSES, job.seed
+    )
+
+
+def make_surfaces(hulls: Iterable[tuple[str, int]], *, jobs: int = 1, progress: bool = True) -> Surfaces:
+    """Samples the complete outer surface of each hull, (type name, seed)."""
+    keys = list(hulls)
+    points = _spread(_surface, keys, jobs, "surfaces" if progress else None)
+    names, seeds = zip(*keys, strict=True)
+    return Surfaces(np.array(names), np.array(seeds, np.int64), np.stack(points))
+
+
+def _surface(key: tuple[str, int]) -> np.ndarray:
+    name, seed = key
+    rng = np.random.default_rng([CLASSES.index(name), seed])
+    return sample_surface(hull(name, seed), SURFACE_POINTS, rng)
+
+
+def _spread(function, items, jobs: int, title: str | None) -> list:
+    bar = partial(tqdm, total=len(items), desc=title, disable=title is None)
+    if jobs == 1:
+        return list(bar(map(function, items)))
+    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
+        return list(bar(pool.imap(function, items, chunksize=16)))
+
+
+def summary(clusters: ClusterSet) -> str:
+    """A table of clusters and median points by 10 m of distance, one row for each type."""
+    steps = np.unique(np.round(clusters.range_m / 10.0).astype(int) * 10)
+    lines = ["type".ljust(20) + "clusters".rjust(9) + "".join(f"{s} m".rjust(7) for s in steps)]
+    near = np.round(clusters.range_m / 10.0).astype(int) * 10
+    for label, name in enumerate(clusters.classes):
+        own = clusters.label == label
+        if own.any():
+            cells = (clusters.n[own & (near == step)] for step in steps)
+            medians = "".join((f"{np.median(c):.0f}" if len(c) else "-").rjust(7) for c in cells)
+            lines.append(f"{name:<20}{own.sum():>9}{medians}")
+    thin = int((clusters.n < MIN_POINTS).sum())
+    return "\n".join(
+        [*lines, f"{len(clusters)} clusters, {thin} of them with fewer than {MIN_POINTS} points"]
+    )
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Command line: makes one set and its surfaces, unless they are there."""
+    args = _parser().parse_args(argv)
+    job = Job(args.set, args.count or COUNTS[args.set], SEEDS[args.set] if args.seed is None else args.seed)
+    path, surfaces = args.out / f"{job.name}.npz", args.out / f"{job.name}_surfaces.npz"
+    clusters = None if args.force else _made(job, path)
+    if clusters is None:
+        surfaces.unlink(missing_ok=True)
+        clusters = make(job, jobs=args.jobs)
+        save(path, clusters)
+    if not surfaces.exists():
+        pairs = set(zip(clusters.label.tolist(), clusters.hull_seed.tolist(), strict=True))
+        save(
+            surfaces, make_surfaces([(CLASSES[label], seed) for label, seed in sorted(pairs)], jobs=args.jobs)
+        )
+    print(f"{path}\n{summary(clusters)}")
+
+
+def _made(job: Job, path: Path) -> ClusterSet | None:
+    if not path.exists():
+        return None
+    clusters = load(path)
+    return clusters if (len(clusters), int(clusters.seed)) == (job.count, job.seed) else None
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m shipshape_lab.simulator.datasets",
+        description="Makes a data set of simulated clusters (NAME.npz) and its hulls' complete surfaces.",
+        epilog="example: python -m shipshape_lab.simulator.datasets train --out runs/data --seed 1 --jobs 2",
+    )
+    parser.add_argument(
+        "set", choices=sorted(COUNTS), help="train, validation, H (hard test) or P (paper grid)"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--count", type=int, help="clusters to make; the first ones of the grid for P")
+    parser.add_argument("--seed", type=int, help="seed of the set's chance")
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    parser.add_argument("--force", action="store_true", help="make it again even if it is there")
+    return parser
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+"""Points of the whole outer surface of a vessel above the water: the truth that restoration is held to."""
+
+import numpy as np
+import trimesh
+
+from shipshape_lab.simulator.vessel import Vessel
+
+VIEW_AZIMUTHS = 24
+VIEW_ELEVATIONS_DEG = (0.0, 15.0, 35.0, 60.0)
+OVERSAMPLING = 3
+MAX_ROUNDS = 40
+
+
+def sample_surface(vessel: Vessel, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Points spread evenly over what can be seen of a vessel from outside, above the water.
+
+    A point counts as visible if the straight way from it to one of 97 far viewpoints (rings of azimuths at
+    several elevations, and straight above) leaves the hull without meeting it again.
+
+    Args:
+        vessel: the hull, in the vessel frame.
+        count: how many points.
+        rng: the only source of chance.
+
+    Returns:
+        Points in the vessel frame, metres, shape (count, 3), float32.
+
+    Raises:
+        ValueError: if hardly anything of the hull can be seen from outside.
+    """
+    kept: list[np.ndarray] = []
+    for _ in range(MAX_ROUNDS):
+        points, triangles = trimesh.sample.sample_surface(vessel.mesh, OVERSAMPLING * count, seed=rng)
+        dry = points[:, 2] >= 0.0
+        points, normals = points[dry], vessel.mesh.face_normals[triangles[dry]]
+        kept.append(points[_visible(vessel.mesh, points, normals)])
+        if sum(map(len, kept)) >= count:
+            return np.concatenate(kept)[:count].astype(np.float32)
+    raise ValueError(
+        f"hull {vessel.name!r} must show an outer surface above the water, but hardly any was found"
+    )
+
+
+def _visible(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    # Starting a little off the surface keeps a ray from meeting its own triangle; soups may face either way,
+    # so the start goes to the viewer's side.
+    lift = 1e-4 * float(mesh.extents.max())
+    visible = np.zeros(len(points), dtype=bool)
+    for view in _views():
+        slopes = normals @ view
+        left = np.flatnonzero(~visible & (np.abs(slopes) > 0.05))
+        if len(left) == 0:
+            continue
+        starts = points[left] + lift * np.sign(slopes[left])[:, None] * normals[left]
+        blocked = mesh.ray.intersects_any(starts, np.broadcast_to(view, starts.shape))
+        visible[left[~blocked]] = True
+    return visible
+
+
+def _views() -> np.ndarray:
+    azimuths = np.arange(VIEW_AZIMUTHS) * 2 * np.pi / VIEW_AZIMUTHS
+    lifts = np.radians(VIEW_ELEVATIONS_DEG)
+    turn, lift = (grid.ravel() for grid in np.meshgrid(azimuths, lifts))
+    ring = np.column_stack([np.cos(lift) * np.cos(turn), np.cos(lift) * np.sin(turn), np.sin(lift)])
+    return np.vstack([ring, [0.0, 0.0, 1.0]])

@@ -1,0 +1,138 @@
+import numpy as np
+import pytest
+
+from shipshape_lab.simulator import datasets, recipes
+from shipshape_lab.simulator.clusters import load, load_surfaces
+from shipshape_lab.simulator.datasets import CLASSES, Job, grid_hull, main, make
+from shipshape_lab.simulator.recipes import GRID_DISTANCES, GRID_HEADINGS_DEG, RECIPES
+from shipshape_lab.simulator.vessels import CATALOGUE, VESSEL_TYPES
+
+
+@pytest.fixture(scope="module")
+def train():
+    return make(Job("train", 60, 1), progress=False)
+
+
+@pytest.fixture
+def few_points(monkeypatch):
+    monkeypatch.setattr(datasets, "SURFACE_POINTS", 200)
+
+
+def same(a, b):
+    return np.array_equal(a.points, b.points) and np.array_equal(a.heading, b.heading)
+
+
+def test_hull_seeds_of_the_splits_are_disjoint():
+    splits = [set(s) for s in (recipes.TRAIN_HULLS, recipes.VALIDATION_HULLS, recipes.TEST_HULLS)]
+    assert len(set.union(*splits)) == sum(map(len, splits))
+    assert set(RECIPES["train"].hulls) == splits[0]
+    assert set(RECIPES["validation"].hulls) == splits[1]
+    assert set(RECIPES["H"].hulls) == splits[2]
+    assert {grid_hull(*cell) for cell in recipes.grid_cells(CATALOGUE)} == splits[2]
+
+
+def test_seeds_of_the_sets_differ():
+    assert len(set(datasets.SEEDS.values())) == len(datasets.COUNTS)
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_drawn_ranges_and_headings_stay_off_the_grid(name):
+    rng = np.random.default_rng(0)
+    drawn = [recipes.draw_placement(RECIPES[name], rng) for _ in range(3000)]
+    ranges = np.array([p.range_m for p in drawn])
+    headings_deg = np.degrees([p.heading for p in drawn])
+    assert np.abs(ranges[:, None] - np.array(GRID_DISTANCES)).min() > 0.5
+    assert np.abs(headings_deg - np.round(headings_deg)).min() > 0.1
+    assert headings_deg.min() > -180
+    assert headings_deg.max() <= 180
+
+
+def test_a_quarter_of_training_ranges_is_far():
+    rng = np.random.default_rng(0)
+    ranges = np.array([recipes.draw_range(RECIPES["train"], rng) for _ in range(4000)])
+    assert np.mean(ranges > 125) == pytest.approx(0.25, abs=0.03)
+    assert ranges.min() >= 25
+    assert ranges.max() <= 200
+
+
+def test_classes_are_the_catalogue_then_the_others():
+    assert CLASSES[:5] == CATALOGUE
+    assert sorted(CLASSES) == sorted(VESSEL_TYPES)
+
+
+def test_clusters_are_consistent_with_their_truth(train):
+    assert len(train) == 60
+    assert train.n.sum() == len(train.points)
+    assert train.n.min() >= 10
+    assert train.points.dtype == np.float32
+    assert set(train.hull_seed) <= set(recipes.TRAIN_HULLS)
+    for i in range(len(train)):
+        points, pose = train.cluster(i).astype(float), train.T_level_vessel[i]
+        at = train.range_m[i] * np.array([np.cos(train.bearing[i]), np.sin(train.bearing[i])])
+        assert pose[:2, 3] == pytest.approx(at)
+        assert np.arctan2(pose[1, 0], pose[0, 0]) == pytest.approx(train.heading[i])
+        box = datasets.hull(train.name(i), int(train.hull_seed[i])).mesh.bounds
+        inside = (points - pose[:3, 3]) @ pose[:3, :3]
+        assert np.all(inside > box[0] - 0.3)
+        assert np.all(inside < box[1] + 0.3)
+        assert points[:, 2].min() >= -train.sensor_height[i]
+
+
+def test_a_quarter_lies_outside_the_catalogue():
+    rngs = [Job("train", 0, 1).rng(i) for i in range(2000)]
+    drawn = [datasets._draw_type(RECIPES["train"], rng) for rng in rngs]
+    assert np.mean([name not in CATALOGUE for name in drawn]) == pytest.approx(0.25, abs=0.03)
+    assert set(drawn) == set(VESSEL_TYPES)
+
+
+def test_a_set_does_not_depend_on_how_many_clusters_or_processes_share_it(train):
+    assert same(make(Job("train", 12, 1), jobs=2, progress=False), make(Job("train", 12, 1), progress=False))
+    assert np.array_equal(make(Job("train", 3, 1), progress=False).cluster(2), train.cluster(2))
+    assert not np.array_equal(make(Job("train", 1, 2), progress=False).cluster(0), train.cluster(0))
+
+
+def test_the_paper_grid_is_whole_and_in_order():
+    cells = recipes.grid_cells(CATALOGUE)
+    assert len(cells) == len(set(cells)) == datasets.COUNTS["P"] == 16_200
+    assert cells[0] == (CATALOGUE[0], 30, 0)
+    assert cells[361] == (CATALOGUE[0], 40, 1)
+    assert cells[-1] == (CATALOGUE[-1], 110, 359)
+
+
+def test_grid_clusters_carry_their_cell():
+    grid = make(Job("P", 5, 3), progress=False)
+    assert np.degrees(grid.heading) == pytest.approx(np.arange(5))
+    assert set(grid.range_m) == {30.0}
+    assert set(grid.bearing) == {0.0}
+    assert set(grid.sensor_height) == {3.0}
+    assert set(grid.lidar) == {"pandar64"}
+    assert recipes.grid_placement(30, 270).heading == pytest.approx(-np.pi / 2)
+    assert len(GRID_HEADINGS_DEG) == 360
+
+
+@pytest.mark.usefixtures("few_points")
+def test_command_writes_clusters_and_surfaces_and_skips_what_is_there(tmp_path, capsys):
+    order = ["validation", "--out", str(tmp_path), "--count", "4"]
+    main(order)
+    assert "4 clusters" in capsys.readouterr().out
+    clusters, surfaces = (
+        load(tmp_path / "validation.npz"),
+        load_surfaces(tmp_path / "validation_surfaces.npz"),
+    )
+    assert surfaces.points.shape[1:] == (200, 3)
+    assert {(clusters.name(i), int(clusters.hull_seed[i])) for i in range(4)} == set(surfaces.index())
+    written = (tmp_path / "validation.npz").stat().st_mtime_ns
+    main(order)
+    assert (tmp_path / "validation.npz").stat().st_mtime_ns == written
+    main([*order, "--force"])
+    assert (tmp_path / "validation.npz").stat().st_mtime_ns > written
+    assert same(load(tmp_path / "validation.npz"), clusters)
+    main([*order[:-1], "5"])
+    assert len(load(tmp_path / "validation.npz")) == 5
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["validation.npz", "validation_surfaces.npz"]
+
+
+def test_a_file_of_something_else_is_refused(tmp_path):
+    np.savez(tmp_path / "other.npz", points=np.zeros((2, 3)))
+    with pytest.raises(ValueError, match="lacks"):
+        load(tmp_path / "other.npz")
