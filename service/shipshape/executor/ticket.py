@@ -1,0 +1,92 @@
+"""A task as the caller hands it in, and the ticket the caller holds while it is computed."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from shipshape.errors import Cancelled, DeadlineExceeded
+
+Clock = Callable[[], float]  # monotonic seconds
+W = TypeVar("W")
+W_contra = TypeVar("W_contra", contravariant=True)
+R = TypeVar("R")
+
+
+class Stage(Protocol[W_contra]):
+    """One step of the work; it keeps its results in the work item."""
+
+    @property
+    def name(self) -> str:
+        """The key of this stage's milliseconds."""
+        ...
+
+    def run(self, work: W_contra, /) -> None:
+        """Do the step."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)  # work items hold arrays: only identity is meant
+class Task(Generic[W, R]):
+    """Work to be carried through `stages` in order, then turned into the answer by `finish`."""
+
+    stages: Sequence[Stage[W]]
+    work: W
+    finish: Callable[[W, Mapping[str, float]], R]  # gets the milliseconds of each stage; runs on the worker
+    deadline: float  # on the executor's clock, seconds; an answer after it is worth nothing
+
+
+class Ticket(Generic[R]):
+    """The place where a task's answer, or its error, appears exactly once.
+
+    Whoever settles first wins: the worker with the answer, the waiter at the deadline, or the caller that
+    leaves. A ticket that settled early is the sign to the worker to drop the work at the next stage boundary.
+    """
+
+    def __init__(self, deadline: float, clock: Clock) -> None:
+        self.deadline = deadline
+        self.future: Future[R] = Future()
+        self._clock = clock
+
+    @property
+    def settled(self) -> bool:
+        """Whether the answer or an error is there."""
+        return self.future.done()
+
+    def remaining(self) -> float:
+        """Seconds left until the deadline, never negative."""
+        return max(0.0, self.deadline - self._clock())
+
+    def cancel(self) -> None:
+        """The caller no longer wants the answer."""
+        self.fail(Cancelled("the caller left before the answer was computed"))
+
+    def expire(self) -> None:
+        """The deadline has passed."""
+        self.fail(DeadlineExceeded("expected an answer before the deadline, got none in time"))
+
+    def result(self) -> R:
+        """Wait for the answer, at most until the deadline, however busy the workers are.
+
+        Raises:
+            DeadlineExceeded: no answer by the deadline.
+            Cancelled: `cancel` was called.
+            Exception: whatever a stage raised.
+        """
+        try:
+            return self.future.result(self.remaining())
+        except TimeoutError:
+            if not self.settled:
+                self.expire()
+            return self.future.result()
+
+    def succeed(self, answer: R) -> None:
+        """Settle with the answer, unless settled already."""
+        with suppress(InvalidStateError):
+            self.future.set_result(answer)
+
+    def fail(self, error: BaseException) -> None:
+        """Settle with an error, unless settled already."""
+        with suppress(InvalidStateError):
+            self.future.set_exception(error)
