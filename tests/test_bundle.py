@@ -31,7 +31,7 @@ def test_what_was_written_is_read_back(folder):
     assert bundle.parameters == {"best": {"temperature": 1.5, "edges": [0, 1, 2]}}
     assert bundle.scores == {"accuracy": 0.98}
     assert bundle.training == {"commit": "0" * 40, "seed": 1}
-    doubled, _ = bundle.models["prior"].run(np.ones((1, 3), np.float32))
+    doubled, _ = bundle.models["prior"].run(x=np.ones((1, 3), np.float32))
     assert doubled.sum() == 6
 
 

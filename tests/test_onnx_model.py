@@ -15,7 +15,7 @@ SIGNATURE = Signature(
 @pytest.mark.parametrize("rows", [0, 1, 7])
 def test_outputs_come_in_the_order_of_the_signature(rows):
     x = np.arange(rows * 3, dtype=np.float32).reshape(rows, 3)
-    doubled, sums = OnnxModel(doubling_onnx(), SIGNATURE).run(x)
+    doubled, sums = OnnxModel(doubling_onnx(), SIGNATURE).run(x=x)
     np.testing.assert_array_equal(doubled, 2 * x)
     np.testing.assert_array_equal(sums, x.sum(axis=1))
 

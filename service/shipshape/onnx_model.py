@@ -59,13 +59,11 @@ class OnnxModel:
         self.signature = _read_signature(self._session)
         if signature is not None:
             _compare(signature, self.signature, label)
-        self._input_names = [spec.name for spec in self.signature.inputs]
         self._output_names = [spec.name for spec in self.signature.outputs]
 
-    def run(self, *inputs: np.ndarray) -> list[np.ndarray]:
-        """The outputs for the inputs, both in the order, shapes and dtypes of the signature."""
-        feed = dict(zip(self._input_names, inputs, strict=True))
-        outputs: list[np.ndarray] = self._session.run(self._output_names, feed)
+    def run(self, **inputs: np.ndarray) -> list[np.ndarray]:
+        """The outputs, in the order of the signature, for inputs of its names, shapes and dtypes."""
+        outputs: list[np.ndarray] = self._session.run(self._output_names, inputs)
         return outputs
 
 
