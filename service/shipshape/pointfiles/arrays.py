@@ -1,0 +1,80 @@
+"""NumPy files: .npy is one cluster, .npz many; no pickles, and no memory taken before its size is known."""
+
+import io
+import math
+import zipfile
+import zlib
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from jaxtyping import Float32
+
+from shipshape.errors import FileError
+from shipshape.pointfiles.columns import as_points, cause, listed
+
+_NPZ_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError)
+
+
+def read_npy(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
+    """The one cluster of a .npy file, (N, 3) floats or records with the fields x, y, z."""
+    with path.open("rb") as stream:
+        return [as_points(_read_array(stream, path.stat().st_size, path.name), path.name)]
+
+
+def read_npz(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
+    """The clusters of a .npz file with the arrays `points` (sum N, 3) and `n`, the points of each cluster."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [name.removesuffix(".npy") for name in archive.namelist()]
+            if not {"points", "n"} <= set(names):
+                raise FileError(f"expected the arrays points and n in {path.name}, got {listed(names)}")
+            points = as_points(_read_member(archive, "points", max_bytes), f"points in {path.name}")
+            n = _read_member(archive, "n", max_bytes)
+    except _NPZ_ERRORS as error:
+        raise FileError(f"expected {path.name} to be a complete .npz file, got: {cause(error)}") from error
+    return _split(points, n, path.name)
+
+
+def _read_member(archive: zipfile.ZipFile, name: str, max_bytes: int) -> np.ndarray:
+    size = archive.getinfo(f"{name}.npy").file_size
+    if size > max_bytes:
+        raise FileError(f"expected {name} to unpack to at most {max_bytes} bytes, got {size}")
+    # zipfile never unpacks more than the size stated here.
+    return _read_array(io.BytesIO(archive.read(f"{name}.npy")), size, name)
+
+
+def _read_array(stream: BinaryIO, size: int, what: str) -> np.ndarray:
+    """The array in `stream` of `size` bytes, its header checked against the size first."""
+    try:
+        shape, dtype = _read_header(stream)
+        promised, present = math.prod(shape) * dtype.itemsize, size - stream.tell()
+        if dtype.hasobject or promised != present:
+            came = (
+                "pickled objects"
+                if dtype.hasobject
+                else f"a header for {promised} bytes with {present} behind it"
+            )
+            raise FileError(f"expected {what} to be a complete plain array, got {came}")
+        stream.seek(0)
+        return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+    except (ValueError, TypeError, SyntaxError, EOFError) as error:
+        raise FileError(f"expected {what} to be a NumPy array, got: {cause(error)}") from error
+
+
+def _read_header(stream: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
+    major, _ = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(stream)
+    return shape, dtype
+
+
+def _split(
+    points: Float32[np.ndarray, "total 3"], n: np.ndarray, what: str
+) -> list[Float32[np.ndarray, "_ 3"]]:
+    if n.ndim != 1 or n.dtype.kind not in "iu" or (n.size and n.min() < 0) or int(n.sum()) != len(points):
+        raise FileError(
+            f"expected n in {what} to be whole numbers that sum to the {len(points)} points, "
+            f"got {n.dtype} of shape {n.shape} and sum {n.sum() if n.dtype.kind in 'iuf' else '(none)'}"
+        )
+    return np.split(points, np.cumsum(n)[:-1]) if n.size else []

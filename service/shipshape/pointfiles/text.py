@@ -1,0 +1,75 @@
+"""Text files: a point a line, columns apart by comma, semicolon or blanks, with or without a header."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+
+from shipshape.errors import FileError
+from shipshape.pointfiles.columns import AXES, as_points, cause, listed
+
+
+def read_text(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
+    """The one cluster of a text file: its columns x, y, z, or the first three when there is no header."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise FileError(f"expected {path.name} to be text in UTF-8, got: {cause(error)}") from error
+    lines = [line for line in lines if line.strip() and not _is_comment(line)]
+    if not lines:
+        raise FileError(f"expected a point a line in {path.name}, got no lines")
+    delimiter = next((mark for mark in ";,\t" if mark in lines[0]), None)
+    header = [word.strip() for word in lines[0].split(delimiter)]
+    named = not any(_is_number(word) for word in header)
+    columns = _find_axes(header, path.name) if named else _first_three(header, path.name)
+    return [_parse(lines[named:], delimiter, columns, path.name)]
+
+
+def _is_comment(line: str) -> bool:
+    """A line led by # is a comment, unless it names the columns as some tools do (`# x y z`)."""
+    text = line.strip()
+    return text.startswith("#") and not set(AXES) <= {_plain(word) for word in re.split(r"[\s,;]+", text)}
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _plain(name: str) -> str:
+    """`"X [m]"`, `//X` and `x` are one name."""
+    words = re.findall(r"\w+", name.lower())
+    return words[0] if words else ""
+
+
+def _find_axes(header: list[str], what: str) -> list[int]:
+    names = [_plain(word) for word in header if word != "#"]
+    if not set(AXES) <= set(names):
+        raise FileError(
+            f"expected numbers, or a header with the columns x, y, z in {what}, got {listed(header)}"
+        )
+    return [names.index(axis) for axis in AXES]
+
+
+def _first_three(row: list[str], what: str) -> list[int]:
+    if len(row) < len(AXES):
+        raise FileError(f"expected at least 3 columns in {what}, got {len(row)}")
+    return [0, 1, 2]
+
+
+def _parse(
+    lines: list[str], delimiter: str | None, columns: list[int], what: str
+) -> Float32[np.ndarray, "n 3"]:
+    if not lines:
+        raise FileError(f"expected a point a line in {what}, got a header alone")
+    try:
+        table = np.loadtxt(lines, delimiter=delimiter, usecols=columns, ndmin=2, comments=None)
+    except ValueError as error:
+        raise FileError(
+            f"expected a number in every x, y, z column of {what}, got: {cause(error)}"
+        ) from error
+    return as_points(table, what)
