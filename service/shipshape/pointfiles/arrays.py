@@ -5,7 +5,6 @@ import math
 import zipfile
 import zlib
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from jaxtyping import Float32
@@ -44,7 +43,7 @@ def _read_member(archive: zipfile.ZipFile, name: str, max_bytes: int) -> np.ndar
     return _read_array(io.BytesIO(archive.read(f"{name}.npy")), size, name)
 
 
-def _read_array(stream: BinaryIO, size: int, what: str) -> np.ndarray:
+def _read_array(stream: io.BufferedIOBase, size: int, what: str) -> np.ndarray:
     """The array in `stream` of `size` bytes, its header checked against the size first."""
     try:
         shape, dtype = _read_header(stream)
@@ -62,7 +61,7 @@ def _read_array(stream: BinaryIO, size: int, what: str) -> np.ndarray:
         raise FileError(f"expected {what} to be a NumPy array, got: {cause(error)}") from error
 
 
-def _read_header(stream: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
+def _read_header(stream: io.BufferedIOBase) -> tuple[tuple[int, ...], np.dtype]:
     major, _ = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(stream)
