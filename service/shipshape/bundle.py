@@ -85,9 +85,7 @@ class _TensorEntry(_Spec):
 
 
 class _ModelEntry(_Spec):
-    file: Annotated[
-        str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9._-]*$")
-    ]  # a plain name cannot leave the folder
+    file: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9._-]*$")]  # a plain name cannot leave the folder
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     inputs: list[_TensorEntry]
     outputs: list[_TensorEntry]
@@ -140,9 +138,7 @@ def _parse_manifest(content: bytes) -> _ManifestSpec:
         raise BundleError(f"expected {MANIFEST} to be TOML, got: {error}") from error
     # Before everything else: a later format may differ in anything but this line.
     if table.get("format") != FORMAT:
-        raise BundleError(
-            f"expected {MANIFEST} of format {FORMAT}, got format {table.get('format', '(none)')}"
-        )
+        raise BundleError(f"expected {MANIFEST} of format {FORMAT}, got format {table.get('format', '(none)')}")
     try:
         spec = _ManifestSpec.model_validate(table)
     except ValidationError as error:

@@ -1,8 +1,125 @@
-"""The data path, one line a stage. (Being built: the contract below is what the rest may rely on.)
+"""The data path: one line a stage, the same stage code for both presets.
 
     pipeline = Pipeline(load_bundle(path))
-    recognition = pipeline.run(contact, Options())           # in process
-    work = pipeline.begin(contact, Options())                # or step by step, as the executor does:
-    for stage in pipeline.stages: stage.run(work)            # each stage has .name and .run(work) -> None
-    recognition = pipeline.finish(work, stage_ms)            # stage_ms: {stage name: milliseconds}
+    recognition = pipeline.run(contact)
+
+The staged executor takes the steps one by one instead: `begin`, each of `stages`, `finish`.
 """
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipshape import frames, sight
+from shipshape.best import BestMethod
+from shipshape.bundle import UNKNOWN, Bundle
+from shipshape.paper import PaperMethod
+from shipshape.stages import keypoints, prior, spd2
+from shipshape.stages.keypoints import KeypointParams
+from shipshape.types import Box, Contact, ImagePair, Options, Preset, Recognition
+from shipshape.validation import ContactLimits, check_contact
+from shipshape.work import Work
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One named step of the pipeline; it reads and fills the fields of the work it is given."""
+
+    name: str
+    run: Callable[[Work], None]
+
+
+class Pipeline:
+    """Cluster in, recognised and restored vessel out. Stateless and safe to share between threads."""
+
+    def __init__(self, bundle: Bundle, limits: ContactLimits | None = None) -> None:
+        self.bundle = bundle
+        self.limits = limits or ContactLimits()
+        self._methods = {Preset.PAPER: PaperMethod(bundle), Preset.BEST: BestMethod(bundle)}
+        self._names = [vessel.name for vessel in bundle.catalogue]
+        self._common = bundle.parameters["common"]
+        self.stages = (
+            Stage("prior", self._prior),
+            Stage("heading", lambda work: self._method(work).heading(work)),
+            Stage("bow_stern", lambda work: self._method(work).bow_stern(work)),
+            Stage("projection", lambda work: self._method(work).projection(work)),
+            Stage("inpainting", lambda work: self._method(work).inpainting(work)),
+            Stage("lifting", lambda work: self._method(work).lifting(work)),
+            Stage("keypoints", self._keypoints),
+            Stage("spd2", self._spd2),
+            Stage("classification", lambda work: self._method(work).classification(work)),
+        )
+
+    def run(self, contact: Contact, options: Options | None = None) -> Recognition:
+        """Recognise one contact.
+
+        Raises:
+            InvalidInput: the contact cannot be one vessel's cluster (see `validation.check_contact`).
+        """
+        work = self.begin(contact, options or Options())
+        stage_ms = {}
+        for stage in self.stages:
+            started = time.perf_counter()
+            stage.run(work)
+            stage_ms[stage.name] = (time.perf_counter() - started) * 1e3
+        return self.finish(work, stage_ms)
+
+    def begin(self, contact: Contact, options: Options) -> Work:
+        """Check the contact and lay it along the line of sight.
+
+        Raises:
+            InvalidInput: the contact cannot be one vessel's cluster.
+        """
+        check_contact(contact, self.limits)
+        frame = sight.sight_frame(contact)
+        return Work(contact, options, frame, sight.to_sight(contact.points_level, frame))
+
+    def finish(self, work: Work, stage_ms: Mapping[str, float]) -> Recognition:
+        """The answer, once every stage has run."""
+        best = int(np.argmax(work.probabilities[:-1]))
+        own = work.contact.own_true_heading_deg
+        pose = work.pose
+        return Recognition(
+            vessel=self._names[best],
+            probability=float(work.probabilities[best]),
+            probabilities=dict(zip([*self._names, UNKNOWN], map(float, work.probabilities), strict=True)),
+            unknown=bool(work.probabilities[-1] > self._common["unknown_above"]),
+            heading=pose.heading,
+            heading_std=work.heading_std,
+            bow_probability=work.bow_probability,
+            aspect_deg=frames.aspect_deg(pose.heading, pose.origin_level),
+            true_heading_deg=None if own is None else frames.true_heading_deg(pose.heading, own),
+            box=_box(work),
+            restored=work.restored,
+            images=ImagePair(work.before, work.after),
+            keypoints_level=pose.to_level(work.keypoints_vessel),
+            rung="full",
+            preset=work.options.preset,
+            image_method=work.options.image_method if work.options.preset is Preset.PAPER else None,
+            bundle=self.bundle.digest,
+            stage_ms=dict(stage_ms),
+        )
+
+    def _method(self, work: Work) -> PaperMethod | BestMethod:
+        return self._methods[work.options.preset]
+
+    def _prior(self, work: Work) -> None:
+        densest = keypoints.select_keypoints(work.points_sight, KeypointParams())
+        images = spd2.describe(work.points_sight, densest, self._common["spd2_radius"])
+        work.prior = prior.estimate_prior(
+            images, self.bundle.models["prior"], temperature=self._common["prior_temperature"]
+        )
+
+    def _keypoints(self, work: Work) -> None:
+        work.points_vessel = work.pose.to_vessel(work.restored.points_level)
+        work.keypoints_vessel = keypoints.select_keypoints(work.points_vessel, KeypointParams())
+
+    def _spd2(self, work: Work) -> None:
+        work.images = spd2.describe(work.points_vessel, work.keypoints_vessel, self._common["spd2_radius"])
+
+
+def _box(work: Work) -> Box:
+    x, y, water = work.pose.origin_level
+    return Box((x, y, water + work.pose.size.height / 2), work.pose.size)

@@ -20,6 +20,8 @@ from enum import StrEnum
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
+from shipshape import frames
+
 
 class Preset(StrEnum):
     """Which set of methods the stages use."""
@@ -70,6 +72,27 @@ class Box:
 
     center_level: tuple[float, float, float]
     size: ReferenceBox
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where the vessel frame lies in the level frame, and how large the vessel is taken to be."""
+
+    heading: float  # rad
+    origin_level: tuple[float, float, float]  # on the waterline under the middle of the box, m
+    size: ReferenceBox
+
+    def turned(self, angle: float) -> "Pose":
+        """The same vessel with its heading turned by `angle`, radians."""
+        return Pose(frames.wrap_angle(self.heading + angle), self.origin_level, self.size)
+
+    def to_vessel(self, points_level: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 3"]:
+        """Level-frame points in the vessel frame."""
+        return frames.to_vessel(points_level, self.heading, self.origin_level)
+
+    def to_level(self, points_vessel: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 3"]:
+        """Vessel-frame points in the level frame."""
+        return frames.to_level(points_vessel, self.heading, self.origin_level)
 
 
 @dataclass(frozen=True, slots=True)

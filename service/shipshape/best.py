@@ -1,0 +1,57 @@
+"""Preset `best`: what measured best; class-free pose, occupancy and height apart, all evidence fused."""
+
+import numpy as np
+
+from shipshape import raster
+from shipshape.bundle import Bundle
+from shipshape.stages import bow_stern, classification, heading, inpainting, lifting, projection
+from shipshape.stages.classification import softmax
+from shipshape.work import Work
+
+
+class BestMethod:
+    """The stages as they measured best; no stage needs the class, so a wrong class cannot spoil the pose."""
+
+    def __init__(self, bundle: Bundle) -> None:
+        self._models = bundle.models
+        self._parameters = bundle.parameters["best"]
+
+    def heading(self, work: Work) -> None:
+        """One look along the line of sight, then looks in the aligned frame."""
+        pose = heading.first_pose(work.points_sight, work.sight, self._models["sight"])
+        work.look = heading.by_network(
+            work.contact.points_level, pose, self._models["aligned"], looks=self._parameters["looks"]
+        )
+        work.pose = work.look.pose
+        work.heading_std = work.look.heading_std * self._parameters["heading_std_scale"]
+
+    def bow_stern(self, work: Work) -> None:
+        """The last aligned look also saw the bow."""
+        work.pose, work.bow_probability = bow_stern.by_network(
+            work.look, temperature=self._parameters["bow_temperature"]
+        )
+
+    def projection(self, work: Work) -> None:
+        """Top view scaled by the vessel's own length, occupancy apart from height."""
+        work.frame = raster.aligned_frame(work.pose.size.length)
+        work.layers = projection.project(work.contact.points_level, work.pose, work.frame)
+        work.before = raster.to_grey(work.layers.count > 0, work.layers.top, work.frame)
+
+    def inpainting(self, work: Work) -> None:
+        """The layers of the whole vessel; the bottleneck also names the class."""
+        work.filled, work.bottleneck = inpainting.inpaint_layers(
+            work.layers, work.pose, len(work.contact.points_level), self._models["inpainting"]
+        )
+        work.after = raster.to_grey(work.filled.occupied, work.filled.top, work.frame)
+
+    def lifting(self, work: Work) -> None:
+        """The measured points and the inferred surface."""
+        work.restored = lifting.lift_layers(
+            work.contact.points_level, work.layers, work.filled, work.pose, work.frame
+        )
+
+    def classification(self, work: Work) -> None:
+        """Prior, aligned look, bottleneck and restored cloud, weighted as validation says."""
+        restored = classification.mean_confidence(work.images, self._models["spd2"])
+        evidence = [work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]
+        work.probabilities = classification.fuse(evidence, self._parameters["fusion_weights"]).astype(np.float32)

@@ -1,0 +1,205 @@
+"""Compiled inner loops (numba): they release the GIL, so that worker threads scale with cores.
+
+Compiled code is cached on disk; the first call in a fresh environment compiles, `warm_up` of the pipeline
+pays for it before the service is ready.
+"""
+
+import numpy as np
+from jaxtyping import Float32, Int32
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def rasterise(
+    points: Float32[np.ndarray, "n 3"],
+    edges: Float32[np.ndarray, " layers+1"],
+    shape: tuple[int, int],
+) -> tuple[
+    Int32[np.ndarray, "layers rows columns"],
+    Float32[np.ndarray, "layers rows columns"],
+    Float32[np.ndarray, "layers rows columns"],
+    Float32[np.ndarray, "2 layers rows columns"],
+]:
+    """Count, highest and lowest depth, and mean sub-cell position of the points in each layer and cell.
+
+    Args:
+        points: (column, row, depth) coordinates; column and row in pixels, 0 at the image's upper left edge.
+        edges: depths at which the layers start and end, ascending; depths outside fall in the outer layers.
+        shape: rows and columns.
+
+    Returns:
+        Counts; highest and lowest depth (0 where empty); mean offset from the cell's middle along columns and
+        rows, in pixels, in [-0.5, 0.5]. Points outside the image are left out.
+    """
+    rows, columns = shape
+    layers = len(edges) - 1
+    count = np.zeros((layers, rows, columns), np.int32)
+    top = np.zeros((layers, rows, columns), np.float32)
+    bottom = np.zeros((layers, rows, columns), np.float32)
+    offset = np.zeros((2, layers, rows, columns), np.float32)
+    for i in range(len(points)):
+        u, v, depth = points[i, 0], points[i, 1], points[i, 2]
+        if not (0 <= u < columns and 0 <= v < rows):
+            continue
+        column, row, layer = int(u), int(v), 0
+        while layer < layers - 1 and depth >= edges[layer + 1]:
+            layer += 1
+        seen = count[layer, row, column]
+        if seen == 0 or depth > top[layer, row, column]:
+            top[layer, row, column] = depth
+        if seen == 0 or depth < bottom[layer, row, column]:
+            bottom[layer, row, column] = depth
+        count[layer, row, column] = seen + 1
+        offset[0, layer, row, column] += (u - column - 0.5 - offset[0, layer, row, column]) / (seen + 1)
+        offset[1, layer, row, column] += (v - row - 0.5 - offset[1, layer, row, column]) / (seen + 1)
+    return count, top, bottom, offset
+
+
+@njit(cache=True, nogil=True)
+def count_neighbours(points: Float32[np.ndarray, "n 3"], radius: float) -> Int32[np.ndarray, " n"]:
+    """How many other points lie within `radius` of each point: n_i = |{j != i: |p_i - p_j| <= r}|.
+
+    Points are swept in order of x, so that only a slab of width `radius` is compared.
+    """
+    order = np.argsort(points[:, 0])
+    x, y, z = points[order, 0], points[order, 1], points[order, 2]
+    found = np.zeros(len(points), np.int32)
+    limit = np.float32(radius * radius)
+    for i in range(len(points)):
+        for j in range(i + 1, len(points)):
+            dx = x[j] - x[i]
+            if dx > radius:
+                break
+            dy, dz = y[j] - y[i], z[j] - z[i]
+            if dx * dx + dy * dy + dz * dz <= limit:
+                found[i] += 1
+                found[j] += 1
+    counts = np.empty(len(points), np.int32)
+    counts[order] = found
+    return counts
+
+
+@njit(cache=True, nogil=True)
+def select_spread(
+    points: Float32[np.ndarray, "n 3"], scores: Int32[np.ndarray, " n"], spacing: float, limit: int
+) -> Int32[np.ndarray, " k"]:
+    """Indices of the highest scores, greedily, each at least `spacing` from all taken before.
+
+    Ties go to the point that is smaller in (x, y, z), so that the order of the points does not matter.
+    """
+    free = np.ones(len(points), np.bool_)
+    chosen = np.empty(limit, np.int32)
+    taken = 0
+    while taken < limit:
+        best = -1
+        for i in range(len(points)):
+            if free[i] and (best < 0 or _ranks_before(points, scores, i, best)):
+                best = i
+        if best < 0:
+            break
+        chosen[taken] = best
+        taken += 1
+        for i in range(len(points)):
+            dx, dy, dz = points[i] - points[best]
+            if dx * dx + dy * dy + dz * dz < spacing * spacing:
+                free[i] = False
+        free[best] = False
+    return chosen[:taken]
+
+
+@njit(cache=True, nogil=True)
+def _ranks_before(
+    points: Float32[np.ndarray, "n 3"], scores: Int32[np.ndarray, " n"], first: int, second: int
+) -> bool:
+    if scores[first] != scores[second]:
+        return bool(scores[first] > scores[second])
+    for axis in range(3):
+        if points[first, axis] != points[second, axis]:
+            return bool(points[first, axis] < points[second, axis])
+    return False
+
+
+@njit(cache=True, nogil=True)
+def bin_spherically(
+    points: Float32[np.ndarray, "n 3"],
+    centre: Float32[np.ndarray, " 3"],
+    radius: float,
+    shape: tuple[int, int, int],
+) -> tuple[
+    Int32[np.ndarray, "strata rows columns"],
+    Float32[np.ndarray, "rows columns"],
+    Float32[np.ndarray, "rows columns"],
+]:
+    """Neighbours of `centre` by shell of distance, elevation and azimuth.
+
+    Args:
+        points: (n, 3), any frame with z up.
+        centre: the keypoint, same frame.
+        radius: outer radius of the neighbourhood, m.
+        shape: strata (equal shells of distance), rows (elevation, zenith first), columns (azimuth from -pi).
+
+    Returns:
+        Counts by stratum and direction; nearest and farthest distance by direction (0 where empty), m.
+    """
+    strata, rows, columns = shape
+    count = np.zeros((strata, rows, columns), np.int32)
+    nearest = np.zeros((rows, columns), np.float32)
+    farthest = np.zeros((rows, columns), np.float32)
+    for i in range(len(points)):
+        dx, dy, dz = points[i] - centre
+        distance = np.sqrt(dx * dx + dy * dy + dz * dz)
+        if distance == 0.0 or distance >= radius:
+            continue
+        row = min(int((0.5 - np.arcsin(dz / distance) / np.pi) * rows), rows - 1)
+        column = min(int((0.5 + np.arctan2(dy, dx) / (2 * np.pi)) * columns), columns - 1)
+        count[min(int(distance / radius * strata), strata - 1), row, column] += 1
+        if nearest[row, column] == 0.0 or distance < nearest[row, column]:
+            nearest[row, column] = distance
+        farthest[row, column] = max(farthest[row, column], distance)
+    return count, nearest, farthest
+
+
+@njit(cache=True, nogil=True)
+def lift_columns(
+    occupied: np.ndarray,  # bool (layers, rows, columns): cells to lift
+    bounds: Float32[np.ndarray, "4 layers rows columns"],
+    offset: Float32[np.ndarray, "2 layers rows columns"],
+    step: float,
+) -> Float32[np.ndarray, "n 3"]:
+    """Points every `step` of depth from bottom to top of each occupied cell, but not where it was measured.
+
+    Args:
+        occupied: (layers, rows, columns) bool.
+        bounds: top and bottom to fill, then top and bottom that were measured (top < bottom: nothing was);
+            shares of the depth range.
+        offset: where in the cell the surface lies, pixels from its middle.
+        step: spacing in depth, same unit as `bounds`.
+
+    Returns:
+        (column, row, depth) coordinates; column and row in pixels, 0 at the image's upper left edge.
+    """
+    layers, rows, columns = occupied.shape
+    limit = 0
+    for pass_number in range(2):
+        lifted = np.empty((limit, 3), np.float32)
+        taken = 0
+        for layer in range(layers):
+            for row in range(rows):
+                for column in range(columns):
+                    if not occupied[layer, row, column]:
+                        continue
+                    top, bottom, seen_top, seen_bottom = bounds[:, layer, row, column]
+                    levels = 1 + max(0, int(np.ceil((top - bottom) / step - 0.5)))
+                    for level in range(levels):
+                        depth = bottom + (top - bottom) * (level + 0.5) / levels
+                        if levels == 1:
+                            depth = top
+                        if seen_bottom - step / 2 <= depth <= seen_top + step / 2:
+                            continue
+                        if pass_number == 1:
+                            lifted[taken, 0] = column + 0.5 + offset[0, layer, row, column]
+                            lifted[taken, 1] = row + 0.5 + offset[1, layer, row, column]
+                            lifted[taken, 2] = depth
+                        taken += 1
+        limit = taken
+    return lifted

@@ -1,0 +1,27 @@
+"""Keypoints: the densest points of a cloud, spread out (paper, section 3.3.1).
+
+n_i = number of other points within r of point i; points are taken by descending n_i, each at least d_min from
+every one taken before. r and d_min are in metres; ties go to the point smaller in (x, y, z).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32
+
+from shipshape import kernels
+
+
+@dataclass(frozen=True, slots=True)
+class KeypointParams:
+    """How densest is measured and how far apart keypoints lie (paper, Table 5: 0.5 and 0.5)."""
+
+    radius: float = 0.5  # r, m
+    spacing: float = 0.5  # d_min, m
+    limit: int = 3  # most keypoints to select
+
+
+def select_keypoints(points: Float32[np.ndarray, "n 3"], params: KeypointParams) -> Float32[np.ndarray, "k 3"]:
+    """The densest points of `points` in any frame, densest first; fewer than the limit if the cloud is small."""
+    counts = kernels.count_neighbours(points, params.radius)
+    return points[kernels.select_spread(points, counts, params.spacing, params.limit)]

@@ -1,0 +1,20 @@
+"""Prior: class probabilities of the raw cluster, before its heading is known (paper, section 3.1).
+
+The SPD2 images are taken in the sight frame. The prior gives the reference box that the paper's heading search
+needs, and is one of the witnesses that preset `best` fuses.
+"""
+
+import numpy as np
+from jaxtyping import Float32
+
+from shipshape.onnx_model import OnnxModel
+
+
+def estimate_prior(
+    images: Float32[np.ndarray, "k 5 16 32"], model: OnnxModel, *, temperature: float
+) -> Float32[np.ndarray, " classes"]:
+    """Mean calibrated confidence over the keypoints' SPD2 images; the last class is "unknown"."""
+    (logits,) = model.run(images=images)
+    scaled = logits / np.float32(temperature)
+    weights = np.exp(scaled - scaled.max(axis=1, keepdims=True))
+    return (weights / weights.sum(axis=1, keepdims=True)).mean(axis=0, dtype=np.float32)

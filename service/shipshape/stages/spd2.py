@@ -1,0 +1,31 @@
+"""SPD2: an image of the neighbourhood of one keypoint: spherical strata, point projection, diameter, distance.
+
+The original definition is not public; this is our own. The neighbours within R of the keypoint are projected
+onto a sphere around it, in the frame of the points (z up, x to the bow where the cloud is aligned): 16 rows of
+elevation (zenith first) x 32 columns of azimuth (from -pi). Five channels in [0, 1], 0 where nothing lies:
+
+    0-2  evidence of occupancy in three equal shells of distance (near, middle, far): 1 - exp(-n / 2)
+    3    distance: 1 - d_min / R, the nearest neighbour in that direction
+    4    diameter: (d_max - d_min) / R, how deep the structure in that direction is
+"""
+
+import numpy as np
+from jaxtyping import Float32
+
+from shipshape import kernels
+
+STRATA, ROWS, COLUMNS = 3, 16, 32
+CHANNELS = STRATA + 2
+
+
+def describe(
+    points: Float32[np.ndarray, "n 3"], keypoints: Float32[np.ndarray, "k 3"], radius: float
+) -> Float32[np.ndarray, "k 5 16 32"]:
+    """One SPD2 image for each keypoint; points and keypoints in the same frame, `radius` R in metres."""
+    images = np.empty((len(keypoints), CHANNELS, ROWS, COLUMNS), np.float32)
+    for image, keypoint in zip(images, keypoints, strict=True):
+        count, nearest, farthest = kernels.bin_spherically(points, keypoint, radius, (STRATA, ROWS, COLUMNS))
+        image[:STRATA] = 1.0 - np.exp(-0.5 * count)
+        image[STRATA] = np.where(farthest > 0, 1.0 - nearest / radius, 0.0)
+        image[STRATA + 1] = (farthest - nearest) / radius
+    return images
