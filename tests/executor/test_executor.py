@@ -1,4 +1,5 @@
 import random
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -164,7 +165,7 @@ def test_cancelled_while_running_stops_at_the_boundary_and_keeps_its_worker_unti
     assert executor.counts().cancelled == 1
 
 
-@pytest.mark.parametrize("error", [ValueError("broken"), TimeoutError("inner"), SystemExit(3)])
+@pytest.mark.parametrize("error", [ValueError("broken"), TimeoutError("inner")])
 def test_an_error_in_a_stage_reaches_the_caller_and_spares_the_worker(executor, error):
     def fail(work):
         raise error
@@ -172,6 +173,12 @@ def test_an_error_in_a_stage_reaches_the_caller_and_spares_the_worker(executor, 
     with pytest.raises(type(error)) as caught:
         executor.submit(task(Note("bad", fail))).result()
     assert caught.value is error
+    assert executor.submit(task(Note("good"))).result()[0].seen == ["good"]
+
+
+def test_a_stage_that_wants_to_exit_only_fails(executor):
+    with pytest.raises(RuntimeError, match=r"SystemExit\(3\)"):
+        executor.submit(task(Note("bad", lambda item: sys.exit(3)))).result()
     assert executor.submit(task(Note("good"))).result()[0].seen == ["good"]
 
 

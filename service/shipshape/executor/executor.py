@@ -178,8 +178,10 @@ def _run(task: Task[W, R], ticket: Ticket[R], *, on_stage: StageObserver, clock:
                 on_stage(stage.name, seconds)
         if not _unwanted(ticket):
             ticket.succeed(task.finish(task.work, stage_ms))
-    except BaseException as error:  # a worker outlives whatever a stage raises
+    except Exception as error:
         ticket.fail(error)
+    except BaseException as error:  # SystemExit and the like must end neither the worker nor the waiter
+        ticket.fail(RuntimeError(f"a stage raised {error!r}"))
 
 
 def _unwanted(ticket: Ticket[Any]) -> bool:

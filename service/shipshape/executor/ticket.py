@@ -86,7 +86,7 @@ class Ticket(Generic[R]):
         with suppress(InvalidStateError):
             self.future.set_result(answer)
 
-    def fail(self, error: BaseException) -> None:
+    def fail(self, error: Exception) -> None:
         """Settle with an error, unless settled already."""
         with suppress(InvalidStateError):
             self.future.set_exception(error)

@@ -1,0 +1,229 @@
+"""The one place where recognition happens, whichever door a contact came through.
+
+contact + wishes + deadline -> checks -> executor -> answer
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
+from shipshape.executor import Executor, Stage, Task, Ticket
+from shipshape.serving.encoding import Limits, Wishes, check_contacts
+from shipshape.types import Contact, Options, Recognition, ReferenceBox
+
+Render = Callable[[Contact, Recognition], bytes]  # -> PNG
+
+
+class PipelineLike(Protocol):
+    """What the core needs of a pipeline; `Any` is its work item, which only its own stages read."""
+
+    @property
+    def stages(self) -> Sequence[Stage[Any]]:
+        """In the order of the data path."""
+        ...
+
+    def begin(self, contact: Contact, options: Options) -> Any:
+        """The work item; raises InvalidInput when the points cannot be one vessel's cluster."""
+        ...
+
+    def finish(self, work: Any, stage_ms: Mapping[str, float]) -> Recognition:
+        """The answer, once every stage ran."""
+        ...
+
+
+class CatalogueEntry(Protocol):
+    """One vessel that the bundle knows."""
+
+    @property
+    def name(self) -> str:
+        """As it appears in answers."""
+        ...
+
+    @property
+    def box(self) -> ReferenceBox:
+        """Outer size, metres."""
+        ...
+
+
+class BundleLike(Protocol):
+    """What the core tells of a bundle."""
+
+    @property
+    def name(self) -> str:
+        """Chosen by whoever made it."""
+        ...
+
+    @property
+    def digest(self) -> str:
+        """sha256, lower-case hex."""
+        ...
+
+    @property
+    def catalogue(self) -> Sequence[CatalogueEntry]:
+        """The vessels it knows."""
+        ...
+
+    @property
+    def scores(self) -> Mapping[str, Any]:
+        """What it reached when it was made; may be nested."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A bundle and the pipeline made of it; replaced as one."""
+
+    bundle: BundleLike
+    pipeline: PipelineLike
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """One contact's recognition and, if wished, its picture (PNG)."""
+
+    contact: Contact
+    recognition: Recognition
+    png: bytes | None = None
+
+
+class Scan:
+    """The contacts of one scan on their way: each a ticket, or the error that refused it."""
+
+    def __init__(self, entries: Sequence[Ticket[Answer] | Exception]) -> None:
+        self._entries = entries
+        self.tickets = [entry for entry in entries if isinstance(entry, Ticket)]
+
+    def outcomes(self) -> list[Answer | Exception]:
+        """Wait for all, at most until their deadline: an answer or an error for each contact.
+
+        Raises:
+            DeadlineExceeded, Cancelled, NotReady: when all that was admitted ended so.
+        """
+        outcomes = [_outcome(entry) for entry in self._entries]
+        admitted = [
+            outcome for entry, outcome in zip(self._entries, outcomes, strict=True) if isinstance(entry, Ticket)
+        ]
+        for common in (DeadlineExceeded, Cancelled, NotReady):
+            if admitted and all(isinstance(outcome, common) for outcome in admitted):
+                raise common(str(admitted[0]))
+        return outcomes
+
+
+class Core:
+    """Checks, queues and answers; ready once it has a model, until it is told to stop.
+
+    Args:
+        executor: Carries the stages.
+        limits: What one request may bring.
+        render: Draws the picture of an answer.
+    """
+
+    def __init__(self, executor: Executor, limits: Limits, render: Render) -> None:
+        self.limits = limits
+        self._executor = executor
+        self._render = render
+        self._model: Model | None = None
+        self._refusal = "expected a running service, got one that is still starting"
+
+    @property
+    def ready(self) -> bool:
+        """Whether requests are taken."""
+        return self._model is not None
+
+    def open(self, model: Model) -> None:
+        """Take requests from now on, answered by `model`."""
+        self._model = model
+
+    def close(self) -> None:
+        """Take no more requests; those under way go on."""
+        self._refusal = "expected a running service, got one that is stopping"
+        self._model = None
+
+    def deadline_in(self, seconds: float) -> float:
+        """The deadline `seconds` from now, on the clock that `recognise` expects."""
+        return self._executor.clock() + seconds
+
+    def model(self) -> Model:
+        """The running model.
+
+        Raises:
+            NotReady: The service is starting or stopping.
+        """
+        if (model := self._model) is None:
+            raise NotReady(self._refusal)
+        return model
+
+    def submit(self, contact: Contact, wishes: Wishes, deadline: float) -> Ticket[Answer]:
+        """Queue one contact; a ticket for its answer.
+
+        Args:
+            contact: Level frame.
+            wishes: How to compute, and whether to draw.
+            deadline: From `deadline_in`.
+
+        Raises:
+            InvalidInput: Another bundle than the running one, or points that cannot be one vessel's cluster.
+            Overloaded, DeadlineExceeded, NotReady: No place, no time, or no model.
+        """
+        return self._executor.submit(self._task(self._wished_model(wishes, deadline), contact, wishes, deadline))
+
+    def submit_scan(self, contacts: Sequence[Contact | InvalidInput], wishes: Wishes, deadline: float) -> Scan:
+        """Queue all acceptable contacts of a scan, or none; the others keep their own error.
+
+        Args:
+            contacts: Level frame; an error stands for a contact that could not even be decoded.
+            wishes: Hold for all contacts.
+            deadline: From `deadline_in`, for all contacts.
+
+        Raises:
+            InvalidInput, Overloaded, DeadlineExceeded, NotReady: What concerns the scan as a whole.
+        """
+        check_contacts(len(contacts), self.limits)
+        model = self._wished_model(wishes, deadline)
+        entries: list[Task[Any, Answer] | Exception] = []
+        for contact in contacts:
+            try:
+                entries.append(
+                    self._task(model, contact, wishes, deadline) if isinstance(contact, Contact) else contact
+                )
+            except Exception as error:  # whatever it is, it is this contact's alone
+                entries.append(error)
+        tickets = iter(self._executor.submit_all([entry for entry in entries if isinstance(entry, Task)]))
+        return Scan([next(tickets) if isinstance(entry, Task) else entry for entry in entries])
+
+    def recognise(self, contact: Contact, wishes: Wishes, deadline: float) -> Answer:
+        """The answer for one contact, waited for; raises as `submit` does, and what the stages raise."""
+        return self.submit(contact, wishes, deadline).result()
+
+    def recognise_scan(
+        self, contacts: Sequence[Contact | InvalidInput], wishes: Wishes, deadline: float
+    ) -> list[Answer | Exception]:
+        """An answer or an error for each contact, waited for; raises as `submit_scan` and `Scan.outcomes` do."""
+        return self.submit_scan(contacts, wishes, deadline).outcomes()
+
+    def _wished_model(self, wishes: Wishes, deadline: float) -> Model:
+        model = self.model()
+        if wishes.bundle not in ("", model.bundle.name, model.bundle.digest):
+            expected = f"{model.bundle.name} ({model.bundle.digest})"
+            raise InvalidInput(f"expected bundle {expected}, got {wishes.bundle:.80}")
+        if self._executor.clock() >= deadline:
+            raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
+        return model
+
+    def _task(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Task[Any, Answer]:
+        def finish(work: Any, stage_ms: Mapping[str, float]) -> Answer:
+            recognition = model.pipeline.finish(work, stage_ms)
+            png = self._render(contact, recognition) if wishes.png else None
+            return Answer(contact, recognition, png)
+
+        return Task(model.pipeline.stages, model.pipeline.begin(contact, wishes.options), finish, deadline)
+
+
+def _outcome(entry: Ticket[Answer] | Exception) -> Answer | Exception:
+    if isinstance(entry, Exception):
+        return entry
+    try:
+        return entry.result()
+    except Exception as error:
+        return error

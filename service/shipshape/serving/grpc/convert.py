@@ -1,0 +1,155 @@
+"""Messages of shipshape.v1 <-> the core's own values; units and frames are the same on both sides."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from enum import StrEnum
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import UInt8
+
+from shipshape.errors import InvalidInput
+from shipshape.serving.core import Answer, Model
+from shipshape.serving.encoding import Limits, Wishes, flat_scores, make_contact, pack, points_from_bytes
+from shipshape.serving.faults import Fault, FaultKind
+from shipshape.types import Box, Contact, ImageMethod, Options, Preset, RestoredCloud
+from shipshape.v1 import shipshape_pb2 as pb
+
+T = TypeVar("T", bound=StrEnum)
+
+PRESETS = {pb.PRESET_PAPER: Preset.PAPER, pb.PRESET_BEST: Preset.BEST}
+IMAGE_METHODS = {
+    pb.IMAGE_METHOD_FULL_TOP: ImageMethod.FULL_TOP,
+    pb.IMAGE_METHOD_FULL_SIDE: ImageMethod.FULL_SIDE,
+    pb.IMAGE_METHOD_Z_TOP: ImageMethod.Z_TOP,
+    pb.IMAGE_METHOD_Z_SIDE: ImageMethod.Z_SIDE,
+}
+ERROR_KINDS = {kind: pb.ErrorKind.Value(f"ERROR_KIND_{kind.name}") for kind in FaultKind}
+_PRESET_NUMBERS = {preset: number for number, preset in PRESETS.items()}
+_IMAGE_METHOD_NUMBERS = {method: number for number, method in IMAGE_METHODS.items()}
+
+
+def to_contact(message: pb.Contact, limits: Limits) -> Contact:
+    """The contact of a message; raises InvalidInput for what `encoding` refuses."""
+    return make_contact(
+        points_from_bytes(message.points, limits),
+        contact_id=message.contact_id,
+        sensor_height_m=message.sensor_height_m if message.HasField("sensor_height_m") else None,
+        own_true_heading_deg=message.own_true_heading_deg if message.HasField("own_true_heading_deg") else None,
+    )
+
+
+def to_contacts(messages: Sequence[pb.Contact], limits: Limits) -> list[Contact | InvalidInput]:
+    """The contacts of a scan, an error in the place of each that cannot be decoded."""
+    contacts: list[Contact | InvalidInput] = []
+    for message in messages:
+        try:
+            contacts.append(to_contact(message, limits))
+        except InvalidInput as error:
+            contacts.append(error)
+    return contacts
+
+
+def to_wishes(message: pb.Options) -> Wishes:
+    """The wishes of a message.
+
+    Raises:
+        InvalidInput: A preset or image method that the contract does not number.
+    """
+    preset, method = Options().preset, Options().image_method
+    if message.preset != pb.PRESET_UNSPECIFIED:
+        preset = _numbered(PRESETS, message.preset, "preset")
+    if message.image_method != pb.IMAGE_METHOD_UNSPECIFIED:
+        method = _numbered(IMAGE_METHODS, message.image_method, "image_method")
+    return Wishes(
+        options=Options(preset, method),
+        bundle=message.bundle,
+        restored=message.include_restored,
+        images=message.include_images,
+        png=message.include_png,
+    )
+
+
+def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
+    """The message of an answer, with what the caller wished to see."""
+    found = answer.recognition
+    message = pb.Recognition(
+        contact_id=answer.contact.contact_id,
+        vessel=found.vessel,
+        probability=found.probability,
+        probabilities=[pb.NamedProbability(name=n, probability=p) for n, p in found.probabilities.items()],
+        unknown=found.unknown,
+        heading=found.heading,
+        heading_std=found.heading_std,
+        bow_probability=found.bow_probability,
+        aspect_deg=found.aspect_deg,
+        true_heading_deg=found.true_heading_deg,
+        box=_box(found.box),
+        measured_points=found.measured_points,
+        inferred_points=found.inferred_points,
+        keypoints=[pb.Point(x=x, y=y, z=z) for x, y, z in found.keypoints_level.tolist()],
+        rung=found.rung,
+        preset=_PRESET_NUMBERS[found.preset],
+        image_method=_IMAGE_METHOD_NUMBERS[found.image_method] if found.image_method else None,
+        bundle=found.bundle,
+        stages=[pb.StageTime(stage=stage, milliseconds=ms) for stage, ms in found.stage_ms.items()],
+        rendered_png=answer.png,
+    )
+    if wishes.restored:
+        message.restored.CopyFrom(_restored(found.restored))
+    if wishes.images:
+        images = pb.ImagePair(before=_image(found.images.before), after=_image(found.images.after))
+        message.images.CopyFrom(images)
+    return message
+
+
+def from_outcomes(
+    contact_ids: Iterable[str], outcomes: Sequence[Answer | Fault], wishes: Wishes
+) -> pb.RecogniseScanResponse:
+    """The message of a scan's outcomes, in the order of its contacts."""
+    response = pb.RecogniseScanResponse()
+    for contact_id, outcome in zip(contact_ids, outcomes, strict=True):
+        result = response.results.add(contact_id=contact_id)
+        if isinstance(outcome, Fault):
+            result.error.CopyFrom(pb.ContactError(kind=ERROR_KINDS[outcome.kind], message=outcome.message))
+        else:
+            result.recognition.CopyFrom(from_answer(outcome, wishes))
+    return response
+
+
+def from_model(model: Model, version: str) -> pb.GetModelInfoResponse:
+    """The message of a model; the limits are the servicer's to add."""
+    return pb.GetModelInfoResponse(
+        version=version,
+        bundle_name=model.bundle.name,
+        bundle=model.bundle.digest,
+        catalogue=[
+            pb.CatalogueVessel(
+                name=entry.name, length=entry.box.length, beam=entry.box.beam, height=entry.box.height
+            )
+            for entry in model.bundle.catalogue
+        ],
+        scores=flat_scores(model.bundle.scores),
+        stages=[stage.name for stage in model.pipeline.stages],
+    )
+
+
+def _box(box: Box) -> pb.Box:
+    x, y, z = box.center_level
+    return pb.Box(
+        center=pb.Point(x=x, y=y, z=z), length=box.size.length, beam=box.size.beam, height=box.size.height
+    )
+
+
+def _restored(cloud: RestoredCloud) -> pb.RestoredCloud:
+    return pb.RestoredCloud(points=pack(cloud.points_level), measured=cloud.measured.tobytes())
+
+
+def _image(image: UInt8[np.ndarray, "rows columns channels"]) -> pb.Image:
+    rows, columns, channels = image.shape
+    return pb.Image(rows=rows, columns=columns, channels=channels, values=image.tobytes())
+
+
+def _numbered(table: Mapping[Any, T], number: int, what: str) -> T:
+    if number not in table:
+        raise InvalidInput(f"expected {what} to be one of {', '.join(table.values())}, got number {number}")
+    return table[number]

@@ -1,0 +1,82 @@
+"""The gRPC door: shipshape.v1, grpc.health.v1 and reflection on one port."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import grpc
+from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha import reflection
+
+from shipshape.serving.core import Core
+from shipshape.serving.grpc.guard import Guard
+from shipshape.serving.grpc.servicer import Servicer
+from shipshape.serving.timing import Timeouts
+from shipshape.telemetry import Metrics
+from shipshape.v1 import shipshape_pb2, shipshape_pb2_grpc
+
+SERVICE = shipshape_pb2.DESCRIPTOR.services_by_name["Shipshape"].full_name
+SPARE_THREADS = 8  # for health, reflection and the refusals of a full queue
+MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that the refusal is ours, in one sentence
+
+
+class GrpcDoor:
+    """Listens from `start` to `stop`; alive from the start, SERVING between `open` and `close`.
+
+    Args:
+        core: Answers.
+        metrics: Told of every request.
+        timeouts: Deadline of callers that set none.
+        waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
+            executor's queue, which is bounded and refuses, is the only place to wait in.
+    """
+
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, *, waiting: int) -> None:
+        limits = core.limits
+        self._health = health.HealthServicer()
+        self._server = grpc.server(
+            ThreadPoolExecutor(waiting + SPARE_THREADS, thread_name_prefix="grpc"),
+            interceptors=[Guard(metrics, limits)],
+            options=[
+                ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
+                ("grpc.max_receive_message_length", limits.max_body_bytes + MESSAGE_SLACK),
+                ("grpc.max_send_message_length", -1),
+            ],
+        )
+        servicer = Servicer(core, metrics, timeouts)
+        shipshape_pb2_grpc.add_ShipshapeServicer_to_server(servicer, self._server)  # type: ignore[no-untyped-call]
+        health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
+        names = (SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME)
+        reflection.enable_server_reflection(names, self._server)
+        self.close()
+
+    def start(self, host: str, port: int) -> int:
+        """Listen; the real port.
+
+        Raises:
+            OSError: The address cannot be bound.
+        """
+        try:
+            bound: int = self._server.add_insecure_port(f"{_bracketed(host)}:{port}")
+        except RuntimeError as error:
+            raise OSError(f"expected to listen on {host}:{port} for gRPC, but could not") from error
+        self._server.start()
+        return bound
+
+    def open(self) -> None:
+        """Tell health checks that requests are taken."""
+        self._set(health_pb2.HealthCheckResponse.SERVING)
+
+    def close(self) -> None:
+        """Tell health checks that requests are not taken."""
+        self._set(health_pb2.HealthCheckResponse.NOT_SERVING)
+
+    def stop(self, drain_s: float) -> None:
+        """Accept no more, let requests under way end for up to `drain_s` seconds, then break them off."""
+        self._server.stop(drain_s).wait()
+
+    def _set(self, status: int) -> None:
+        for service in ("", SERVICE):
+            self._health.set(service, status)
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

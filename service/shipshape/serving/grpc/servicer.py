@@ -1,0 +1,84 @@
+"""shipshape.v1.Shipshape: translate, delegate to the core, translate back."""
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from typing import Any
+
+import grpc
+
+from shipshape.executor import Ticket
+from shipshape.serving.core import Core
+from shipshape.serving.encoding import check_contacts
+from shipshape.serving.faults import Fault, fault_of
+from shipshape.serving.grpc import convert
+from shipshape.serving.grpc.guard import set_trailing
+from shipshape.serving.timing import Timeouts, server_timing, summed
+from shipshape.telemetry import OK, Metrics
+from shipshape.v1 import shipshape_pb2 as pb
+from shipshape.v1 import shipshape_pb2_grpc as pb_grpc
+
+
+class Servicer(pb_grpc.ShipshapeServicer):
+    """The methods of the contract; errors are the guard's matter."""
+
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts) -> None:
+        self._core = core
+        self._metrics = metrics
+        self._timeouts = timeouts
+
+    def Recognise(self, request: pb.RecogniseRequest, context: grpc.ServicerContext) -> pb.RecogniseResponse:
+        """One contact."""
+        wishes = convert.to_wishes(request.options)
+        contact = convert.to_contact(request.contact, self._core.limits)
+        ticket = self._core.submit(contact, wishes, self._deadline(context))
+        _cancel_with(context, [ticket])
+        answer = ticket.result()
+        _set_timing(context, answer.recognition.stage_ms)
+        return pb.RecogniseResponse(recognition=convert.from_answer(answer, wishes))
+
+    def RecogniseScan(
+        self, request: pb.RecogniseScanRequest, context: grpc.ServicerContext
+    ) -> pb.RecogniseScanResponse:
+        """Many contacts of one scan."""
+        wishes = convert.to_wishes(request.options)
+        check_contacts(len(request.contacts), self._core.limits)
+        contacts = convert.to_contacts(request.contacts, self._core.limits)
+        scan = self._core.submit_scan(contacts, wishes, self._deadline(context))
+        _cancel_with(context, scan.tickets)
+        outcomes = [fault_of(end) if isinstance(end, Exception) else end for end in scan.outcomes()]
+        self._metrics.count_contacts("grpc", (end.kind if isinstance(end, Fault) else OK for end in outcomes))
+        _set_timing(context, summed(end.recognition for end in outcomes if not isinstance(end, Fault)))
+        return convert.from_outcomes((contact.contact_id for contact in request.contacts), outcomes, wishes)
+
+    def GetModelInfo(
+        self, request: pb.GetModelInfoRequest, context: grpc.ServicerContext
+    ) -> pb.GetModelInfoResponse:
+        """What this service runs and what it accepts."""
+        info = convert.from_model(self._core.model(), version("shipshape"))
+        limits = self._core.limits
+        info.limits.max_body_bytes = limits.max_body_bytes
+        info.limits.max_points = limits.max_points
+        info.limits.max_contacts = limits.max_contacts
+        info.limits.default_timeout_ms = self._timeouts.default_ms
+        info.limits.budget_ms = self._timeouts.budget_ms
+        set_trailing(context)
+        return info
+
+    def _deadline(self, context: grpc.ServicerContext) -> float:
+        remaining = context.time_remaining()
+        return self._core.deadline_in(self._timeouts.default_ms / 1e3 if remaining is None else remaining)
+
+
+def _cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -> None:
+    """Drop the work when the RPC ends before it."""
+
+    def cancel() -> None:
+        for ticket in tickets:
+            ticket.cancel()
+
+    if not context.add_callback(cancel):  # it has ended already
+        cancel()
+
+
+def _set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float]) -> None:
+    set_trailing(context, ("server-timing", server_timing(stage_ms)))

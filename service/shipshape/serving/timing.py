@@ -1,0 +1,28 @@
+"""What callers are told about time: the budget, the default deadline, and each stage's milliseconds."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from shipshape.types import Recognition
+
+
+@dataclass(frozen=True, slots=True)
+class Timeouts:
+    """Milliseconds."""
+
+    default_ms: float = 1000.0  # a request may take, when its caller sets no deadline
+    budget_ms: float = 50.0  # an answer is meant to take
+
+
+def server_timing(stage_ms: Mapping[str, float]) -> str:
+    """Milliseconds of each stage in the form of the Server-Timing header: "prior;dur=0.31, heading;dur=1.2"."""
+    return ", ".join(f"{stage};dur={milliseconds:.3f}" for stage, milliseconds in stage_ms.items())
+
+
+def summed(recognitions: Iterable[Recognition]) -> dict[str, float]:
+    """Milliseconds of each stage over all contacts of a scan."""
+    total: dict[str, float] = {}
+    for recognition in recognitions:
+        for stage, milliseconds in recognition.stage_ms.items():
+            total[stage] = total.get(stage, 0.0) + milliseconds
+    return total

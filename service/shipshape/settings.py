@@ -1,0 +1,115 @@
+"""Environment -> frozen settings; every one has a default that works, and a wrong one stops the start."""
+
+import os
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from shipshape.errors import ShipshapeError
+
+PREFIX = "SHIPSHAPE_"
+
+
+class SettingsError(ShipshapeError):
+    """A setting is unknown or has a value that cannot work."""
+
+
+def default_bundle() -> Path:
+    """`models` in the current directory, else that of the source checkout this package runs from."""
+    here, checkout = Path("models"), Path(__file__).resolve().parents[2] / "models"
+    return checkout if not here.is_dir() and checkout.is_dir() else here
+
+
+class Settings(BaseSettings):
+    """Everything an operator may change; each field is the variable SHIPSHAPE_<FIELD>."""
+
+    model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="forbid")
+
+    host: str = Field(
+        "127.0.0.1",
+        description="Address both doors listen on. Loopback keeps strangers out; 0.0.0.0 lets the network in.",
+    )
+    rest_port: int = Field(8080, ge=0, le=65535, description="TCP port of the REST door; 0 picks a free one.")
+    grpc_port: int = Field(50051, ge=0, le=65535, description="TCP port of the gRPC door; 0 picks a free one.")
+    bundle: Path = Field(
+        default_factory=default_bundle,
+        description="Folder of the model bundle. Default: ./models, else the models of the source checkout.",
+    )
+    workers: int = Field(
+        0,
+        ge=0,
+        le=1024,
+        description="Threads that compute; 0 is one a usable core. More of them share the same cores: "
+        "higher latency, no more throughput.",
+    )
+    queue_limit: int = Field(
+        512,
+        ge=1,
+        le=65536,
+        description="Contacts that may wait, at least max_contacts. Longer rides out bursts but lets answers "
+        "grow old; shorter refuses sooner.",
+    )
+    budget_ms: float = Field(
+        50.0,
+        gt=0,
+        description="Milliseconds an answer is meant to take; published to callers. Changes no computation.",
+    )
+    default_timeout_ms: float = Field(
+        1000.0,
+        gt=0,
+        le=3_600_000,
+        description="Milliseconds a request may take when its caller sets no deadline. Generous enough for a "
+        "full queue on few cores; shorter sheds more of the callers that did not say what they need.",
+    )
+    drain_s: float = Field(
+        10.0,
+        ge=0,
+        description="Seconds that requests under way may still take after SIGTERM. Must be shorter than the "
+        "grace of whatever sends the signal.",
+    )
+    max_body_bytes: int = Field(
+        16 * 2**20,
+        ge=1024,
+        le=2**30,
+        description="Bytes of one request. Larger admits bigger scans, each held in memory while it is read.",
+    )
+    max_points: int = Field(
+        65536,
+        ge=1,
+        description="Points of one contact. Bounds the time one contact can take from all the others.",
+    )
+    max_contacts: int = Field(256, ge=1, description="Contacts of one scan. They are queued all at once.")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        "info", description="Least severe log line written; debug adds one line a request."
+    )
+
+    @model_validator(mode="after")
+    def _a_scan_fits_the_queue(self) -> Self:
+        if self.queue_limit < self.max_contacts:
+            raise ValueError(f"expected at least max_contacts, {self.max_contacts}, got {self.queue_limit}")
+        return self
+
+
+def load_settings(**overrides: Any) -> Settings:
+    """The settings of the environment, with `overrides` (from the command line) above them.
+
+    Raises:
+        SettingsError: An unknown SHIPSHAPE_* variable, or a value that cannot work.
+    """
+    # pydantic-settings passes over variables it does not know, even with extra="forbid".
+    known = {f"{PREFIX}{name}".upper() for name in Settings.model_fields}
+    unknown = sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)
+    if unknown:
+        raise SettingsError(f"expected only known {PREFIX}* variables, got {', '.join(unknown)}")
+    try:
+        return Settings(**overrides)
+    except ValidationError as error:
+        raise SettingsError(_first_complaint(error)) from error
+
+
+def _first_complaint(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    name = ".".join(map(str, first["loc"])) or "queue_limit"
+    return f"expected another value of {PREFIX}{name.upper()}, got {first['input']!r:.80}: {first['msg']}"
