@@ -8,6 +8,7 @@ from shipshape_lab.simulator.occluders import BoxOccluder, HullOccluder
 from shipshape_lab.simulator.scan import Conditions, scan_vessel
 from shipshape_lab.simulator.sea import Motion, Placement, SeaState
 from shipshape_lab.simulator.sensor import PANDAR64
+from shipshape_lab.simulator.skirt import with_skirt
 from shipshape_lab.simulator.vessel import Vessel
 
 BOX = box_hull()
@@ -95,6 +96,17 @@ def test_a_rolling_vessel_shows_nothing_below_the_water():
     rolling = Conditions(sea=SeaState(15.0, 8.0, 1.0))
     for seed in range(10):
         assert scan(Placement(25.0, 1.0), conditions=rolling, seed=seed).points_level[:, 2].min() >= -3.0
+
+
+def test_a_heaved_hull_shows_its_wetted_side():
+    open_below = Vessel("cut", box_hull().mesh.slice_plane([0, 0, 1e-9], [0, 0, 1]))
+    lifted = Conditions(sea=SeaState(0.0, 0.0, 0.4))
+    raised = scan(Placement(25.0, np.pi / 2), conditions=lifted, vessel=with_skirt(open_below), seed=21)
+    points = to_vessel(raised.T_level_vessel, raised.points_level.astype(float))
+    assert raised.T_level_vessel[2, 3] == pytest.approx(-3.0 + 0.67, abs=0.01)
+    assert np.abs(points[:, 1]) == pytest.approx(3.0, abs=1e-4)
+    assert -0.67 <= points[:, 2].min() < -0.5
+    assert with_skirt(open_below).box == pytest.approx(open_below.box)
 
 
 def test_noise_lies_along_the_ray_with_its_standard_deviation():

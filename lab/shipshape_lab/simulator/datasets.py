@@ -1,7 +1,7 @@
 """Makes the data sets: random sets for training, validation and the hard test, and the paper grid P.
 
-Every cluster has its own random stream, the set's seed sequence with the cluster's number as its spawn key, so
-a set is the same whatever the number of processes.
+Every cluster has its own random stream, the seed sequence of the set with the number of the cluster as its
+spawn key, so a set is the same whatever the number of processes.
 
 Example:
     python -m shipshape_lab.simulator.datasets train --out runs/data --count 20000 --seed 1 --jobs 2
@@ -22,7 +22,9 @@ from shipshape_lab.simulator import recipes
 from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, collect, load, load_surfaces, save
 from shipshape_lab.simulator.scan import Scan, scan_vessel
 from shipshape_lab.simulator.sensor import DEFAULT_LIDAR
+from shipshape_lab.simulator.skirt import with_skirt
 from shipshape_lab.simulator.surface import sample_surface
+from shipshape_lab.simulator.vessel import Vessel
 from shipshape_lab.simulator.vessels import CATALOGUE, VESSEL_TYPES, build_vessel
 
 __all__ = ["CLASSES", "Job", "load", "load_surfaces", "main", "make", "make_surfaces"]
@@ -34,7 +36,11 @@ SURFACE_POINTS = 20_000
 COUNTS = {"train": 20_000, "validation": 4_000, "H": 5_000, "P": len(recipes.grid_cells(CATALOGUE))}
 SEEDS = {"train": 1, "validation": 2, "P": 3, "H": 4}
 
-hull = cache(build_vessel)
+
+@cache
+def hull(name: str, seed: int) -> Vessel:
+    """A hull as the scanner wants it, built once in each process."""
+    return with_skirt(build_vessel(name, seed))
 
 
 @dataclass(frozen=True)
@@ -95,9 +101,7 @@ def make(job: Job, *, jobs: int = 1, progress: bool = True) -> ClusterSet:
         The set, clusters in order.
     """
     cluster = partial(grid_cluster if job.name == "P" else random_cluster, job)
-    return collect(
-        _spread(cluster, range(job.count), jobs, job.name if progress else None), CLASSES, job.seed
-    )
+    return collect(_spread(cluster, range(job.count), jobs, job.name if progress else None), CLASSES, job.seed)
 
 
 def make_surfaces(hulls: Iterable[tuple[str, int]], *, jobs: int = 1, progress: bool = True) -> Surfaces:
@@ -111,7 +115,7 @@ def make_surfaces(hulls: Iterable[tuple[str, int]], *, jobs: int = 1, progress: 
 def _surface(key: tuple[str, int]) -> np.ndarray:
     name, seed = key
     rng = np.random.default_rng([CLASSES.index(name), seed])
-    return sample_surface(hull(name, seed), SURFACE_POINTS, rng)
+    return sample_surface(build_vessel(name, seed), SURFACE_POINTS, rng)
 
 
 def _spread(function, items, jobs: int, title: str | None) -> list:
@@ -134,9 +138,7 @@ def summary(clusters: ClusterSet) -> str:
             medians = "".join((f"{np.median(c):.0f}" if len(c) else "-").rjust(7) for c in cells)
             lines.append(f"{name:<20}{own.sum():>9}{medians}")
     thin = int((clusters.n < MIN_POINTS).sum())
-    return "\n".join(
-        [*lines, f"{len(clusters)} clusters, {thin} of them with fewer than {MIN_POINTS} points"]
-    )
+    return "\n".join([*lines, f"{len(clusters)} clusters, {thin} of them with fewer than {MIN_POINTS} points"])
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -151,9 +153,7 @@ def main(argv: list[str] | None = None) -> None:
         save(path, clusters)
     if not surfaces.exists():
         pairs = set(zip(clusters.label.tolist(), clusters.hull_seed.tolist(), strict=True))
-        save(
-            surfaces, make_surfaces([(CLASSES[label], seed) for label, seed in sorted(pairs)], jobs=args.jobs)
-        )
+        save(surfaces, make_surfaces([(CLASSES[label], seed) for label, seed in sorted(pairs)], jobs=args.jobs))
     print(f"{path}\n{summary(clusters)}")
 
 
@@ -170,9 +170,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Makes a data set of simulated clusters (NAME.npz) and its hulls' complete surfaces.",
         epilog="example: python -m shipshape_lab.simulator.datasets train --out runs/data --seed 1 --jobs 2",
     )
-    parser.add_argument(
-        "set", choices=sorted(COUNTS), help="train, validation, H (hard test) or P (paper grid)"
-    )
+    parser.add_argument("set", choices=sorted(COUNTS), help="train, validation, H (hard test) or P (paper grid)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the files")
     parser.add_argument("--count", type=int, help="clusters to make; the first ones of the grid for P")
     parser.add_argument("--seed", type=int, help="seed of the set's chance")

@@ -64,9 +64,7 @@ def _read(path: Path) -> trimesh.Trimesh:
     if not np.isfinite(mesh.vertices).all():
         raise ValueError(f"{path} must hold finite vertices, but some are not")
     if mesh.extents.max() == 0.0:
-        raise ValueError(
-            f"{path} must have an extent, but all of its vertices coincide (Draco is not supported)"
-        )
+        raise ValueError(f"{path} must have an extent, but all of its vertices coincide (Draco is not supported)")
     return mesh.apply_transform(T_VESSEL_GLTF) if suffix == ".glb" else mesh
 
 

@@ -92,9 +92,7 @@ def draw_placement(recipe: Recipe, rng: np.random.Generator) -> Placement:
     )
 
 
-def draw_conditions(
-    recipe: Recipe, placement: Placement, length: float, rng: np.random.Generator
-) -> Conditions:
+def draw_conditions(recipe: Recipe, placement: Placement, length: float, rng: np.random.Generator) -> Conditions:
     """Sea, dropout and now and then a box in front of a hull of this length (metres)."""
     sea = recipe.sea if rng.random() < 0.5 else None
     occluded = rng.random() < recipe.occluded_share

@@ -120,9 +120,7 @@ def scan_vessel(
     return Scan(points[dry], placement, T_level_vessel, vessel.name, vessel.seed)
 
 
-def angular_window(
-    vessel: Vessel, T_level_vessel: np.ndarray
-) -> tuple[tuple[float, float], tuple[float, float]]:
+def angular_window(vessel: Vessel, T_level_vessel: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
     """Azimuths and elevations (radians) between which every ray that can hit the vessel lies.
 
     The azimuths run upwards from low to high and so may pass +-pi; all round if the sensor is over the hull.

@@ -61,7 +61,7 @@ class Placement:
         turn = self.bearing + np.pi - self.heading
         return float(np.degrees(abs(np.arctan2(np.sin(turn), np.cos(turn)))))
 
-    def T_level_vessel(self, motion: Motion = Motion()) -> np.ndarray:  # noqa: N802
+    def T_level_vessel(self, motion: Motion = Motion()) -> np.ndarray:
         """Pose of the vessel frame in the level frame: yaw, then pitch, then roll; shape (4, 4), float64."""
         transform = np.eye(4)
         transform[:3, :3] = _rotation(self.heading, motion)

@@ -68,17 +68,13 @@ class Lidar:
 
 def _pandar64() -> Lidar:
     dense = 2.0 - np.arange(49) / 6.0
-    elevations_deg = np.concatenate(
-        [[15.0, 11.0, 8.0, 5.0, 3.0], dense, -np.arange(7.0, 15.0), [-19.0, -25.0]]
-    )
+    elevations_deg = np.concatenate([[15.0, 11.0, 8.0, 5.0, 3.0], dense, -np.arange(7.0, 15.0), [-19.0, -25.0]])
     return Lidar("pandar64", elevations_deg, 0.2, max_range=230.0, half_range=200.0, range_noise_sd=0.02)
 
 
 def _os1_64() -> Lidar:
     elevations_deg = np.linspace(22.5, -22.5, 64)
-    return Lidar(
-        "os1_64", elevations_deg, 360.0 / 1024, max_range=200.0, half_range=150.0, range_noise_sd=0.03
-    )
+    return Lidar("os1_64", elevations_deg, 360.0 / 1024, max_range=200.0, half_range=150.0, range_noise_sd=0.03)
 
 
 def _hdl64e() -> Lidar:
