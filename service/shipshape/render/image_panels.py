@@ -1,0 +1,39 @@
+"""The projected image before and after inpainting, every pixel a block."""
+
+import numpy as np
+
+from shipshape.render.canvas import Canvas, Font, Rect
+from shipshape.render.style import BACKGROUND, FAINT, MUTED, PANEL_EDGE, Colour
+
+_LAYERS: tuple[tuple[str, Colour], ...] = (
+    ("lower", (255, 120, 60)),
+    ("middle", (80, 220, 90)),
+    ("upper", (80, 90, 255)),
+)
+
+
+def draw_image(canvas: Canvas, area: Rect, image: np.ndarray) -> None:
+    """`image` (rows, columns, 3) as large as whole blocks allow, its empty cells the picture's background."""
+    rows, columns = image.shape[:2]
+    block = max(min(int(2 * area.width) // columns, int(2 * area.height) // rows), 1) / 2
+    width, height = min(columns * block, area.width), min(rows * block, area.height)
+    frame = Rect(area.x + (area.width - width) / 2, area.y + (area.height - height) / 2, width, height)
+    canvas.pixels(_displayed(image), frame)
+    canvas.outline(frame, PANEL_EDGE)
+
+
+def _displayed(image: np.ndarray) -> np.ndarray:
+    """The layers mixed in colours that can be told apart on a dark ground, from a visible least value up."""
+    light = np.where(image > 0, 0.25 + 0.75 / 255 * image, 0.0)
+    mixed = np.minimum(light @ np.array([colour for _, colour in _LAYERS], np.float64), 255)
+    return np.where(image.any(axis=2, keepdims=True), mixed, BACKGROUND).astype(np.uint8)
+
+
+def draw_layer_legend(canvas: Canvas, right: float, y: float) -> None:
+    """Which colour is which layer, ending at `right`."""
+    font = Font(MUTED, 12.0, anchor="right")
+    for name, colour in reversed(_LAYERS):
+        right -= canvas.text(name, (right, y), font) + 8
+        canvas.rectangle(Rect(right - 6, y - 9, 9, 9), colour)
+        right -= 20
+    canvas.text("layer", (right, y), Font(FAINT, 12.0, anchor="right"))

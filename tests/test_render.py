@@ -1,0 +1,113 @@
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from builders_recognition import SIZE, recognised
+from shipshape.render import render_png
+from shipshape.render.canvas import Canvas, Rect
+from shipshape.render.style import INFERRED, MEASURED
+from shipshape.render.text_panels import vessel_title
+from shipshape.render.views import View, bow_line, box_corners, from_above, from_direction
+from shipshape.types import Box, Contact, ImagePair, Preset, RestoredCloud
+
+
+def decoded(png: bytes) -> np.ndarray:
+    return cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+
+
+def share_near(picture: np.ndarray, colour: tuple[int, int, int]) -> float:
+    return float((np.abs(picture.astype(int) - colour).max(axis=2) < 40).mean())
+
+
+@pytest.mark.parametrize("preset", list(Preset))
+@pytest.mark.parametrize("unknown", [True, False])
+def test_the_picture_is_a_png_that_shows_measured_and_inferred(preset, unknown):
+    picture = decoded(render_png(*recognised(preset=preset, unknown=unknown)))
+    assert picture.shape == (900, 1600, 3)
+    assert share_near(picture, MEASURED) > 0.001
+    assert share_near(picture, INFERRED) > 0.001
+
+
+def test_a_picture_is_the_same_every_time_from_any_thread():
+    contact, recognition = recognised()
+    with ThreadPoolExecutor(4) as pool:
+        pictures = set(pool.map(lambda _: render_png(contact, recognition), range(8)))
+    assert len(pictures) == 1
+
+
+def test_what_is_missing_leaves_its_place_empty():
+    contact, recognition = recognised(inferred=0)
+    none = np.empty((0, 3), np.float32)
+    sparse = replace(
+        recognition, stage_ms={}, keypoints_level=none, images=ImagePair(*[np.zeros((1, 1, 3), np.uint8)] * 2)
+    )
+    assert decoded(render_png(contact, sparse)).shape == (900, 1600, 3)
+    empty = replace(sparse, restored=RestoredCloud(none, np.empty(0, bool)))
+    assert decoded(render_png(contact, empty)).shape == (900, 1600, 3)
+
+
+def test_many_classes_and_long_names_fit():
+    contact, recognition = recognised()
+    many = {f"a_rather_long_vessel_name_number_{i}": 0.01 for i in range(99)} | {"unknown": 0.01}
+    assert render_png(contact, replace(recognition, probabilities=many, vessel=next(iter(many))))
+
+
+@settings(max_examples=8, deadline=None)
+@given(heading=st.floats(-math.pi, math.pi), unknown=st.booleans())
+def test_any_heading_can_be_drawn(heading, unknown):
+    contact, recognition = recognised(heading=heading, unknown=unknown, inferred=10)
+    assert render_png(contact, recognition).startswith(b"\x89PNG")
+
+
+def test_one_point_can_be_drawn():
+    contact, recognition = recognised()
+    assert render_png(Contact(contact.points_level[:1]), recognition)
+
+
+def test_an_unknown_vessel_is_called_so():
+    assert vessel_title(recognised(unknown=True)[1]) == "unknown, most like pilot boat"
+    assert vessel_title(recognised()[1]) == "pilot boat"
+
+
+def test_from_above_ahead_is_up_and_port_is_left():
+    view = View(
+        Canvas(200, 200, (0, 0, 0)),
+        Rect(0.0, 0.0, 200.0, 200.0),
+        from_above(),
+        np.array([[-5.0, -5, 0], [5, 5, 0]]),
+    )
+    assert view.pixels_per_metre == 20
+    np.testing.assert_allclose(view.spot((0.0, 0.0, 0.0)), (100, 100))
+    np.testing.assert_allclose(view.spot((5.0, 0.0, 9.0)), (100, 0), atol=1e-9)
+    np.testing.assert_allclose(view.spot((0.0, 5.0, 9.0)), (0, 100), atol=1e-9)
+
+
+def test_seen_from_port_abeam_the_bow_is_left_and_up_is_up():
+    # heading 0: bow along +x; the viewer stands at +y, its port side
+    seen = from_direction(math.pi / 2)
+    np.testing.assert_allclose(seen(np.array([[1.0, 0, 0], [0, 0, 1]])), [[-1, 0], [0, 1]], atol=1e-12)
+    assert seen.nearness(np.array([[0.0, 2, 0]]))[0] == pytest.approx(2)
+
+
+@given(azimuth=st.floats(-4, 4), elevation=st.floats(-1.5, 1.5))
+def test_a_view_is_a_right_handed_rotation(azimuth, elevation):
+    view = from_direction(azimuth, elevation)
+    axes = np.array([view.right, view.up, view.viewer])
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1)
+
+
+def test_box_corners_start_at_the_port_bow_on_the_waterline():
+    corners = box_corners(Box((10.0, 0.0, 1.5), SIZE), math.pi / 2)  # bow along +y, port along -x
+    np.testing.assert_allclose(corners[0], (8, 6, 0), atol=1e-12)
+    np.testing.assert_allclose(corners[1], (12, 6, 0), atol=1e-12)
+    np.testing.assert_allclose(corners[4], (8, 6, 3), atol=1e-12)
+    middle, tip = bow_line(Box((10.0, 0.0, 1.5), SIZE), math.pi / 2)
+    np.testing.assert_allclose(middle, (10, 0, 0))
+    assert tip[1] > 6
