@@ -38,7 +38,8 @@ def test_seeds_of_the_sets_differ():
 @pytest.mark.parametrize("name", RECIPES)
 def test_drawn_ranges_and_headings_stay_off_the_grid(name):
     rng = np.random.default_rng(0)
-    drawn = [recipes.draw_placement(RECIPES[name], rng) for _ in range(3000)]
+    bands = [recipes.draw_band(RECIPES[name], rng) for _ in range(3000)]
+    drawn = [recipes.draw_placement(band, rng) for band in bands]
     ranges = np.array([p.range_m for p in drawn])
     headings_deg = np.degrees([p.heading for p in drawn])
     assert np.abs(ranges[:, None] - np.array(GRID_DISTANCES)).min() > 0.5
@@ -49,7 +50,8 @@ def test_drawn_ranges_and_headings_stay_off_the_grid(name):
 
 def test_a_quarter_of_training_ranges_is_far():
     rng = np.random.default_rng(0)
-    ranges = np.array([recipes.draw_range(RECIPES["train"], rng) for _ in range(4000)])
+    bands = [recipes.draw_band(RECIPES["train"], rng) for _ in range(4000)]
+    ranges = np.array([recipes.draw_range(band, rng) for band in bands])
     assert np.mean(ranges > 125) == pytest.approx(0.25, abs=0.03)
     assert ranges.min() >= 25
     assert ranges.max() <= 200

@@ -32,6 +32,7 @@ __all__ = ["CLASSES", "Job", "load", "load_surfaces", "main", "make", "make_surf
 CLASSES = (*CATALOGUE, *(name for name in VESSEL_TYPES if name not in CATALOGUE))
 MIN_POINTS = 10
 MAX_DRAWS = 1000
+DRAWS_OF_A_BAND = 50
 SURFACE_POINTS = 20_000
 COUNTS = {"train": 20_000, "validation": 4_000, "H": 5_000, "P": len(recipes.grid_cells(CATALOGUE))}
 SEEDS = {"train": 1, "validation": 2, "P": 3, "H": 4}
@@ -60,9 +61,12 @@ def random_cluster(job: Job, i: int) -> tuple[Scan, str]:
     """Cluster i of a random set; the type stays, all else is drawn again until there are enough points."""
     recipe, rng = recipes.RECIPES[job.name], job.rng(i)
     name = _draw_type(recipe, rng)
-    for _ in range(MAX_DRAWS):
+    for draw in range(MAX_DRAWS):
+        # Else far bands would empty towards near ones; but a small craft may never show enough far off.
+        if draw % DRAWS_OF_A_BAND == 0:
+            band = recipes.draw_band(recipe, rng)
         vessel = hull(name, int(rng.choice(recipe.hulls)))
-        lidar, placement = recipes.draw_lidar(rng), recipes.draw_placement(recipe, rng)
+        lidar, placement = recipes.draw_lidar(rng), recipes.draw_placement(band, rng)
         conditions = recipes.draw_conditions(recipe, placement, vessel.box[0], rng)
         scan = scan_vessel(vessel, lidar, placement=placement, conditions=conditions, rng=rng)
         if len(scan.points_level) >= MIN_POINTS:

@@ -66,10 +66,16 @@ def draw_lidar(rng: np.random.Generator) -> Lidar:
     return (PANDAR64, OS1_64, HDL64E)[rng.choice(3, p=(0.6, 0.2, 0.2))]
 
 
-def draw_range(recipe: Recipe, rng: np.random.Generator) -> float:
-    """Distance in metres, in one of the recipe's bands, off the distances of the paper grid."""
+def draw_band(recipe: Recipe, rng: np.random.Generator) -> tuple[float, float]:
+    """Nearest and farthest range of one of the recipe's bands, metres."""
     band = rng.choice(len(recipe.bands), p=[share for share, _, _ in recipe.bands])
     _, nearest, farthest = recipe.bands[band]
+    return nearest, farthest
+
+
+def draw_range(band: tuple[float, float], rng: np.random.Generator) -> float:
+    """Distance in metres, in a band, off the distances of the paper grid."""
+    nearest, farthest = band
     while True:
         range_m = rng.uniform(nearest, farthest)
         if abs(range_m - 10.0 * round(range_m / 10.0)) > RANGE_GAP:
@@ -82,10 +88,10 @@ def draw_heading(rng: np.random.Generator) -> float:
     return float(np.radians(whole + rng.uniform(HEADING_GAP_DEG * 1.01, 1.0 - HEADING_GAP_DEG * 1.01)))
 
 
-def draw_placement(recipe: Recipe, rng: np.random.Generator) -> Placement:
-    """Any bearing, a sensor 2 to 6 m above the water."""
+def draw_placement(band: tuple[float, float], rng: np.random.Generator) -> Placement:
+    """A range in the band, any bearing, a sensor 2 to 6 m above the water."""
     return Placement(
-        range_m=draw_range(recipe, rng),
+        range_m=draw_range(band, rng),
         heading=draw_heading(rng),
         bearing=float(rng.uniform(-np.pi, np.pi)),
         sensor_height=float(rng.uniform(2.0, 6.0)),
