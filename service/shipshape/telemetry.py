@@ -47,7 +47,7 @@ class Metrics:
         )
         self._request = Histogram(
             "shipshape_request_seconds",
-            "Time of one request from the last byte read to the answer, whatever the outcome.",
+            "Time of one request at the door, whatever the outcome.",
             ["door", "method", "outcome"],
             buckets=REQUEST_BUCKETS,
             registry=registry,

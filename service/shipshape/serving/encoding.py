@@ -141,7 +141,10 @@ def _check_points(count: int, limits: Limits) -> None:
 
 
 def _to_float32(rows: list[Any]) -> Float32[np.ndarray, "n 3"]:
-    array = np.asarray(rows)
+    try:
+        array = np.asarray(rows)
+    except ValueError:  # lists inside the rows
+        array = np.empty(0)
     if array.dtype.kind not in "iuf" or array.ndim != 2:
         raise InvalidInput("expected only numbers in points, got something else among them")
     with np.errstate(over="ignore"):  # beyond float32 is infinite, which the pipeline refuses

@@ -23,7 +23,7 @@ IMAGE_METHODS = {
     pb.IMAGE_METHOD_Z_TOP: ImageMethod.Z_TOP,
     pb.IMAGE_METHOD_Z_SIDE: ImageMethod.Z_SIDE,
 }
-ERROR_KINDS = {kind: pb.ErrorKind.Value(f"ERROR_KIND_{kind.name}") for kind in FaultKind}
+ERROR_KINDS = {kind: f"ERROR_KIND_{kind.name}" for kind in FaultKind}
 _PRESET_NUMBERS = {preset: number for number, preset in PRESETS.items()}
 _IMAGE_METHOD_NUMBERS = {method: number for number, method in IMAGE_METHODS.items()}
 

@@ -1,0 +1,115 @@
+"""The core's values -> JSON, in the form that `schemas` promises."""
+
+import base64
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import cv2
+import numpy as np
+import orjson
+from jaxtyping import UInt8
+
+from shipshape.serving.core import Answer, Model
+from shipshape.serving.encoding import Limits, Wishes, flat_scores
+from shipshape.serving.faults import Fault
+from shipshape.serving.timing import Timeouts
+from shipshape.types import Box, ImagePair, RestoredCloud
+
+Json = dict[str, Any]
+
+
+def to_bytes(value: Json) -> bytes:
+    """The JSON text; numpy arrays become lists."""
+    return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def from_answer(answer: Answer, wishes: Wishes) -> Json:
+    """A `RecognitionAnswer`, with what the caller wished to see."""
+    found = answer.recognition
+    value: Json = {
+        "contact_id": answer.contact.contact_id,
+        "vessel": found.vessel,
+        "probability": found.probability,
+        "probabilities": dict(found.probabilities),
+        "unknown": found.unknown,
+        "heading": found.heading,
+        "heading_std": found.heading_std,
+        "bow_probability": found.bow_probability,
+        "aspect_deg": found.aspect_deg,
+        "true_heading_deg": found.true_heading_deg,
+        "box": _box(found.box),
+        "measured_points": found.measured_points,
+        "inferred_points": found.inferred_points,
+        "keypoints": np.ascontiguousarray(found.keypoints_level),
+        "rung": found.rung,
+        "preset": found.preset,
+        "image_method": found.image_method,
+        "bundle": found.bundle,
+        "stage_ms": dict(found.stage_ms),
+    }
+    if wishes.restored:
+        value["restored"] = _restored(found.restored)
+    if wishes.images:
+        value["images"] = _images(found.images)
+    if answer.png is not None:
+        value["rendered_png"] = _base64(answer.png)
+    return value
+
+
+def from_outcomes(contact_ids: Sequence[str], outcomes: Sequence[Answer | Fault], wishes: Wishes) -> Json:
+    """A `ScanAnswer`, in the order of the contacts."""
+    results: list[Json] = []
+    for contact_id, outcome in zip(contact_ids, outcomes, strict=True):
+        if isinstance(outcome, Fault):
+            error = {"error": outcome.kind, "detail": outcome.message}
+            results.append({"contact_id": contact_id, "error": error})
+        else:
+            results.append({"contact_id": contact_id, "recognition": from_answer(outcome, wishes)})
+    return {"results": results}
+
+
+def from_model(model: Model, limits: Limits, timeouts: Timeouts) -> Json:
+    """A `ModelAnswer`."""
+    return {
+        "version": version("shipshape"),
+        "bundle_name": model.bundle.name,
+        "bundle": model.bundle.digest,
+        "catalogue": [
+            {"name": entry.name, "length": entry.box.length, "beam": entry.box.beam, "height": entry.box.height}
+            for entry in model.bundle.catalogue
+        ],
+        "scores": flat_scores(model.bundle.scores),
+        "stages": [stage.name for stage in model.pipeline.stages],
+        "limits": {
+            "max_body_bytes": limits.max_body_bytes,
+            "max_points": limits.max_points,
+            "max_contacts": limits.max_contacts,
+            "default_timeout_ms": timeouts.default_ms,
+            "budget_ms": timeouts.budget_ms,
+        },
+    }
+
+
+def _box(box: Box) -> Json:
+    size = box.size
+    return {"center": list(box.center_level), "length": size.length, "beam": size.beam, "height": size.height}
+
+
+def _restored(cloud: RestoredCloud) -> Json:
+    return {"points": np.ascontiguousarray(cloud.points_level), "measured": cloud.measured.tolist()}
+
+
+def _images(images: ImagePair) -> Json:
+    return {"before": _base64(_png(images.before)), "after": _base64(_png(images.after))}
+
+
+def _png(image: UInt8[np.ndarray, "rows columns 3"]) -> bytes:
+    written, encoded = cv2.imencode(".png", image)
+    if not written:
+        raise RuntimeError(f"cv2 could not encode an image of shape {image.shape}")
+    return encoded.tobytes()
+
+
+def _base64(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")

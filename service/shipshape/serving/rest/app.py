@@ -1,0 +1,49 @@
+"""The REST door as an ASGI application."""
+
+from importlib.metadata import version
+from typing import Any
+
+from fastapi import FastAPI
+
+from shipshape.serving.core import Core
+from shipshape.serving.faults import FaultKind
+from shipshape.serving.rest import contract
+from shipshape.serving.rest.problems import add_handlers
+from shipshape.serving.rest.routes import Routes
+from shipshape.serving.rest.schemas import ModelAnswer, RecognitionAnswer, ScanAnswer
+from shipshape.serving.timing import Timeouts
+from shipshape.telemetry import Metrics
+
+DESCRIPTION = """Recognises and restores vessels from LiDAR clusters.
+
+Level frame: origin at the LiDAR, gravity-aligned, x ahead of the sensor's own vessel, y to port, z up. Metres;
+radians, except where a name ends in _deg. Packed points are little-endian float32 x y z, 12 bytes a point.
+"""
+
+
+def build_app(core: Core, metrics: Metrics, timeouts: Timeouts) -> FastAPI:
+    """The application; it answers 503 until the core is open."""
+    # The framework's documentation pages load scripts from elsewhere; the contract itself is at /openapi.json.
+    app = FastAPI(
+        title="Shipshape", version=version("shipshape"), description=DESCRIPTION, docs_url=None, redoc_url=None
+    )
+    routes = Routes(core, metrics, timeouts)
+    refusals = contract.problems(*(kind for kind in FaultKind if kind is not FaultKind.CANCELLED))
+    not_ready = contract.problems(FaultKind.NOT_READY)
+
+    def add(path: str, handler: Any, *methods: str, **more: Any) -> None:
+        app.add_api_route(path, handler, methods=list(methods), operation_id=handler.__name__, **more)
+
+    add("/v1/recognise", routes.recognise, "POST", **_api(RecognitionAnswer, refusals, contract.recognise_extra()))
+    add("/v1/scan", routes.scan, "POST", **_api(ScanAnswer, refusals, contract.scan_extra()))
+    add("/v1/model", routes.model, "GET", **_api(ModelAnswer, not_ready, None))
+    add("/livez", routes.live, "GET")
+    add("/readyz", routes.ready, "GET", responses=not_ready)
+    add("/metrics", routes.metrics, "GET")
+    add_handlers(app)
+    contract.add_contract(app)
+    return app
+
+
+def _api(answer: type, refusals: dict[int | str, dict[str, Any]], extra: dict[str, Any] | None) -> dict[str, Any]:
+    return {"responses": {200: {"model": answer}, **refusals}, "openapi_extra": extra}

@@ -1,0 +1,79 @@
+"""What OpenAPI says beyond what the framework can see: bodies are read and checked by our own code."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+from shipshape.serving.faults import FaultKind
+from shipshape.serving.rest.problems import MEDIA_TYPE, STATUS
+from shipshape.serving.rest.requests import JSON, PACKED, TIMEOUT_HEADER
+from shipshape.serving.rest.schemas import ContactBody, Problem, QueryFields, RecogniseBody, ScanBody
+
+REF = "#/components/schemas/{model}"
+REQUESTS: Sequence[type[BaseModel]] = (ContactBody, RecogniseBody, ScanBody, Problem)
+_TIMEOUT = {
+    "name": TIMEOUT_HEADER,
+    "in": "header",
+    "description": "Milliseconds that the answer may take; a late one is not computed. "
+    "Absent: default_timeout_ms of /v1/model.",
+    "schema": {"type": "number", "exclusiveMinimum": 0},
+}
+
+
+def recognise_extra() -> dict[str, Any]:
+    """Body and parameters of /v1/recognise."""
+    packed = {"schema": {"type": "string", "format": "binary"}}
+    body = {JSON: {"schema": {"$ref": REF.format(model="RecogniseBody")}}, PACKED: packed}
+    return {"requestBody": _body(body), "parameters": [_TIMEOUT, *_query()]}
+
+
+def scan_extra() -> dict[str, Any]:
+    """Body and parameters of /v1/scan."""
+    body = {JSON: {"schema": {"$ref": REF.format(model="ScanBody")}}}
+    return {"requestBody": _body(body), "parameters": [_TIMEOUT]}
+
+
+def problems(*kinds: FaultKind) -> dict[int | str, dict[str, Any]]:
+    """The refusals of a path."""
+    content = {MEDIA_TYPE: {"schema": {"$ref": REF.format(model="Problem")}}}
+    return {
+        STATUS[kind]: {"description": kind.replace("_", " ").capitalize() + ".", "content": content}
+        for kind in kinds
+    }
+
+
+def add_contract(app: FastAPI) -> None:
+    """Make /openapi.json hold the schemas of the bodies too."""
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            schema = get_openapi(
+                title=app.title, version=app.version, description=app.description, routes=app.routes
+            )
+            _, definitions = models_json_schema([(model, "validation") for model in REQUESTS], ref_template=REF)
+            schema.setdefault("components", {}).setdefault("schemas", {}).update(definitions["$defs"])
+            app.openapi_schema = schema
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]  # the framework's own way to extend the schema
+
+
+def _body(content: dict[str, Any]) -> dict[str, Any]:
+    return {"required": True, "content": content}
+
+
+def _query() -> list[dict[str, Any]]:
+    schema = QueryFields.model_json_schema(ref_template=REF)
+    return [
+        {
+            "name": name,
+            "in": "query",
+            "description": f"Only beside {PACKED}: {field.pop('description', name)}",
+            "schema": field,
+        }
+        for name, field in schema["properties"].items()
+    ]

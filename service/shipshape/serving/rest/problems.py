@@ -1,0 +1,70 @@
+"""The one table of errors of the REST door, and RFC 9457 problem documents."""
+
+from http import HTTPStatus
+
+import orjson
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+
+from shipshape.serving.faults import Fault, FaultKind
+from shipshape.telemetry import request_id
+
+STATUS = {
+    FaultKind.INVALID_INPUT: 400,
+    FaultKind.TOO_LARGE: 413,
+    FaultKind.UNPROCESSABLE: 422,
+    FaultKind.OVERLOADED: 429,
+    FaultKind.DEADLINE_EXCEEDED: 504,
+    FaultKind.CANCELLED: 499,  # not registered, but what proxies log for a client that left
+    FaultKind.NOT_READY: 503,
+    FaultKind.INTERNAL: 500,
+}
+MEDIA_TYPE = "application/problem+json"
+ID_HEADER = "X-Request-Id"
+
+
+def problem(fault: Fault) -> Response:
+    """The problem document of a fault."""
+    title = fault.kind.replace("_", " ").capitalize()
+    return _document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
+
+
+def add_handlers(app: FastAPI) -> None:
+    """Give the framework's own refusals the same form."""
+    app.add_exception_handler(HTTPException, _framework_refusal)
+    app.add_exception_handler(RequestValidationError, _validation_refusal)
+
+
+def _framework_refusal(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    title = HTTPStatus(error.status_code).phrase
+    detail = error.detail
+    if error.status_code == 404:
+        detail = f"expected a path that /openapi.json lists, got {request.url.path!r:.80}"
+    elif error.status_code == 405:
+        allowed = (error.headers or {}).get("Allow", "another method")
+        detail = f"expected {allowed} on {request.url.path}, got {request.method}"
+    response = _document(error.status_code, title=title, detail=detail, error=FaultKind.INVALID_INPUT)
+    response.headers.update(error.headers or {})
+    return response
+
+
+def _validation_refusal(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    where = ".".join(map(str, first["loc"]))
+    return problem(Fault(FaultKind.INVALID_INPUT, f"expected another value of {where}, got: {first['msg']}"))
+
+
+def _document(status: int, *, title: str, detail: str, error: FaultKind) -> Response:
+    body = {
+        "type": f"urn:shipshape:problem:{error}",
+        "title": title,
+        "status": status,
+        "detail": detail,
+        "error": error,
+        "request_id": request_id.get(),
+    }
+    headers = {ID_HEADER: request_id.get()} if request_id.get() else None
+    return Response(orjson.dumps(body), status, headers, media_type=MEDIA_TYPE)

@@ -1,0 +1,186 @@
+"""The JSON of the REST contract. Metres, level frame, radians except where a name ends in _deg."""
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+
+from shipshape.types import ImageMethod, Preset
+
+Points = Annotated[
+    Any,  # checked by `encoding.points_from_rows`: a validator a number would cost more than the recognition
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+        }
+    ),
+]
+Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class _Asked(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class OptionsFields(_Asked):
+    """How to compute, and what to put into the answer."""
+
+    preset: Preset = Field(Preset.BEST, description="Which set of methods computes the answer.")
+    image_method: ImageMethod = Field(ImageMethod.FULL_SIDE, description="Used by preset paper alone.")
+    bundle: str = Field("", description="Name or digest of the bundle insisted on; empty: whichever runs.")
+    include_restored: bool = Field(False, description="Put the whole vessel's points into the answer.")
+    include_images: bool = Field(False, description="Put the images before and after inpainting into it.")
+    include_png: bool = Field(False, description="Put a picture for people into it.")
+
+
+class ContactFields(_Asked):
+    """What the caller knows of a contact beside its points."""
+
+    contact_id: str = Field("", description="The caller's name for it, returned; at most 256 characters.")
+    sensor_height_m: float | None = Field(
+        None, description="LiDAR above the water, metres; absent: the lowest point stands in for the water."
+    )
+    own_true_heading_deg: float | None = Field(
+        None, description="The caller's own heading, degrees clockwise from true north."
+    )
+
+
+class ContactBody(ContactFields):
+    """One vessel to recognise; its points in one of the two forms."""
+
+    points: Points = Field(None, description="[x, y, z] each, metres, level frame.")
+    points_base64: str | None = Field(
+        None, description="The same as packed little-endian float32 x y z, in base64."
+    )
+
+
+class RecogniseBody(ContactBody, OptionsFields):
+    """One contact, and how to compute it."""
+
+
+class QueryFields(ContactFields, OptionsFields):
+    """What goes beside a body of packed points."""
+
+
+class ScanBody(OptionsFields):
+    """Many contacts of one scan; the options hold for all of them."""
+
+    contacts: Annotated[
+        list[Any],  # each is checked alone, so that a bad one does not spoil the others
+        WithJsonSchema({"type": "array", "items": {"$ref": "#/components/schemas/ContactBody"}}),
+    ] = Field(description="One or more, up to the limit that /v1/model states.")
+
+
+class BoxAnswer(BaseModel):
+    """Oriented box of the whole vessel; its yaw is the heading."""
+
+    center: Triple = Field(description="Metres, level frame.")
+    length: float = Field(description="Along the heading, metres.")
+    beam: float = Field(description="Across the heading, metres.")
+    height: float = Field(description="Above the waterline, metres.")
+
+
+class RestoredAnswer(BaseModel):
+    """The whole vessel: the measured points as they came, and the inferred ones."""
+
+    points: list[Triple] = Field(description="Metres, level frame.")
+    measured: list[bool] = Field(description="Of each point: true measured, false inferred.")
+
+
+class ImagesAnswer(BaseModel):
+    """PNG files in base64; blue, green, red hold the lower, middle and upper layer; black is empty."""
+
+    before: str = Field(description="The projected image.")
+    after: str = Field(description="The same after inpainting.")
+
+
+class RecognitionAnswer(BaseModel):
+    """What Shipshape says of one contact."""
+
+    contact_id: str = Field(description="As it came in the request.")
+    vessel: str = Field(description="The most probable of the catalogue, also when unknown is true.")
+    probability: float = Field(description="Of vessel, 0 to 1.")
+    probabilities: dict[str, float] = Field(description="Of every vessel and of unknown; they sum to 1.")
+    unknown: bool = Field(description="Better treated as a vessel outside the catalogue.")
+    heading: float = Field(description="Radians counter-clockwise from +x of the level frame, (-pi, pi].")
+    heading_std: float = Field(description="Standard deviation of the heading modulo pi, radians.")
+    bow_probability: float = Field(description="That the bow points along heading, 0 to 1.")
+    aspect_deg: float = Field(description="0 bow-on, 90 abeam, 180 stern-on.")
+    true_heading_deg: float | None = Field(
+        description="Clockwise from true north, [0, 360); null unless the caller gave its own heading."
+    )
+    box: BoxAnswer
+    measured_points: int = Field(description="Points of the restored cloud that the sensor measured.")
+    inferred_points: int = Field(description="Points of the restored cloud that were inferred.")
+    keypoints: list[Triple] = Field(description="The points described for classification; metres, level.")
+    rung: str = Field(description="Rung of the ladder of ever cheaper answers; full is the top.")
+    preset: Preset
+    image_method: ImageMethod | None = Field(description="null: the image of preset best.")
+    bundle: str = Field(description="sha256 of the model bundle.")
+    stage_ms: dict[str, float] = Field(description="Milliseconds of each stage.")
+    restored: RestoredAnswer | None = Field(None, description="Only with include_restored.")
+    images: ImagesAnswer | None = Field(None, description="Only with include_images.")
+    rendered_png: str | None = Field(None, description="Base64; only with include_png.")
+
+
+class ContactError(BaseModel):
+    """Why one contact of a scan got no answer."""
+
+    error: str = Field(description="The kind, as in a problem document.")
+    detail: str = Field(description="What was expected and what came.")
+
+
+class ContactResult(BaseModel):
+    """Outcome for one contact: recognition or error."""
+
+    contact_id: str = Field(description="As it came in the request.")
+    recognition: RecognitionAnswer | None = None
+    error: ContactError | None = None
+
+
+class ScanAnswer(BaseModel):
+    """Outcomes in the order of the contacts."""
+
+    results: list[ContactResult]
+
+
+class CatalogueVesselAnswer(BaseModel):
+    """A vessel that the bundle knows; metres above the waterline."""
+
+    name: str
+    length: float
+    beam: float
+    height: float
+
+
+class LimitsAnswer(BaseModel):
+    """What this service accepts."""
+
+    max_body_bytes: int = Field(description="Bytes of one request.")
+    max_points: int = Field(description="Points of one contact.")
+    max_contacts: int = Field(description="Contacts of one scan.")
+    default_timeout_ms: float = Field(description="Milliseconds, when the caller sets no deadline.")
+    budget_ms: float = Field(description="Milliseconds that an answer is meant to take.")
+
+
+class ModelAnswer(BaseModel):
+    """What this service runs."""
+
+    version: str = Field(description="Of the service.")
+    bundle_name: str
+    bundle: str = Field(description="sha256 of the bundle.")
+    catalogue: list[CatalogueVesselAnswer]
+    scores: dict[str, float] = Field(description="What the bundle reached when it was made.")
+    stages: list[str] = Field(description="In the order of the data path.")
+    limits: LimitsAnswer
+
+
+class Problem(BaseModel):
+    """RFC 9457 problem document."""
+
+    type: str = Field(description="urn:shipshape:problem:<error>, or about:blank.")
+    title: str
+    status: int
+    detail: str = Field(description="One sentence: what was expected and what came.")
+    error: str = Field(description="The kind of the error.")
+    request_id: str = Field(description="Also in the header X-Request-Id and in the service's log.")

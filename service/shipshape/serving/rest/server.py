@@ -1,0 +1,71 @@
+"""The REST door's listener: uvicorn in a thread of its own, on a socket that was bound before."""
+
+import socket
+import threading
+from collections.abc import Callable
+
+import uvicorn
+from fastapi import FastAPI
+
+KEEP_ALIVE_S = 75  # longer than proxies keep idle connections, else they meet a closed one now and then
+
+
+class RestDoor:
+    """Listens from `start` to `stop`.
+
+    Args:
+        app: Answers.
+        on_death: Called when the listener ends without having been asked to.
+    """
+
+    def __init__(self, app: FastAPI, *, on_death: Callable[[], None]) -> None:
+        self._app = app
+        self._on_death = on_death
+        self._server: uvicorn.Server | None = None
+        self._thread: threading.Thread | None = None
+
+    def start(self, host: str, port: int) -> int:
+        """Listen; the real port.
+
+        Raises:
+            OSError: The address cannot be bound.
+        """
+        listener = _listener(host, port)
+        bound: int = listener.getsockname()[1]
+        # log_config: the service's own log format holds. access_log: the metrics and debug lines tell more.
+        config = uvicorn.Config(self._app, log_config=None, access_log=False, timeout_keep_alive=KEEP_ALIVE_S)
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(
+            target=self._serve, args=(self._server, listener), name="rest", daemon=True
+        )
+        self._thread.start()
+        return bound
+
+    def stop(self, drain_s: float) -> None:
+        """Accept no more, let requests under way end for up to `drain_s` seconds, then break them off."""
+        if self._server is None or self._thread is None:
+            return
+        self._server.config.timeout_graceful_shutdown = max(1, round(drain_s))
+        self._server.should_exit = True
+        self._thread.join(drain_s + 2)
+
+    def _serve(self, server: uvicorn.Server, listener: socket.socket) -> None:
+        try:
+            server.run(sockets=[listener])
+        finally:
+            listener.close()
+            if not server.should_exit:
+                self._on_death()
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+        listener.listen(2048)
+    except OSError as error:
+        listener.close()
+        raise OSError(f"expected to listen on {host}:{port} for REST, got: {error.strerror or error}") from error
+    return listener

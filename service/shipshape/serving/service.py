@@ -1,0 +1,85 @@
+"""Both doors on one core, from live to ready to stopped; knows the parts only by what they do.
+
+live: the doors listen and refuse -> ready: every stage is warm -> stopping: no new requests, those under way end
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+from prometheus_client import CollectorRegistry
+
+from shipshape.executor import Executor, usable_cores
+from shipshape.serving.core import Core, Model, Render
+from shipshape.serving.encoding import Limits
+from shipshape.serving.grpc.server import GrpcDoor
+from shipshape.serving.rest.app import build_app
+from shipshape.serving.rest.server import RestDoor
+from shipshape.serving.timing import Timeouts
+from shipshape.serving.warmup import warm_up
+from shipshape.settings import Settings
+from shipshape.telemetry import Metrics
+
+_logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Addresses:
+    """Where the doors really listen."""
+
+    host: str
+    rest_port: int
+    grpc_port: int
+
+
+class Service:
+    """A service that `start` makes live, `open` makes ready, and `stop` ends without dropping a request.
+
+    Args:
+        settings: See there.
+        render: Draws the picture of an answer.
+        on_death: Called when a door ends without having been asked to.
+    """
+
+    def __init__(self, settings: Settings, render: Render, *, on_death: Callable[[], None]) -> None:
+        cv2.setNumThreads(1)  # the workers are the parallelism; a pool in each of them only adds latency
+        workers = settings.workers or usable_cores()
+        limits = Limits(settings.max_body_bytes, settings.max_points, settings.max_contacts)
+        timeouts = Timeouts(settings.default_timeout_ms, settings.budget_ms)
+        self._settings = settings
+        self._render = render
+        self._metrics = Metrics(CollectorRegistry())
+        self.executor = Executor(workers, settings.queue_limit, on_stage=self._metrics.observe_stage)
+        self._metrics.watch_queue(lambda: self.executor.queue_depth, lambda: self.executor.running)
+        self._core = Core(self.executor, limits, render)
+        self._grpc = GrpcDoor(self._core, self._metrics, timeouts, waiting=settings.queue_limit + workers)
+        self._rest = RestDoor(build_app(self._core, self._metrics, timeouts), on_death=on_death)
+
+    def start(self) -> Addresses:
+        """Listen and refuse; raises OSError when an address cannot be bound."""
+        host = self._settings.host
+        return Addresses(
+            host,
+            rest_port=self._rest.start(host, self._settings.rest_port),
+            grpc_port=self._grpc.start(host, self._settings.grpc_port),
+        )
+
+    def open(self, model: Model) -> None:
+        """Warm `model` up, then take requests; raises whatever the warm-up raises."""
+        warm_up(model, self._render)
+        self._metrics.set_bundle(model.bundle.name, model.bundle.digest)
+        self._core.open(model)
+        self._grpc.open()
+        self._metrics.set_ready(True)
+
+    def stop(self) -> None:
+        """Not ready, accept no more, let what is under way end, for up to `drain_s` seconds in all doors."""
+        self._core.close()
+        self._grpc.close()
+        self._metrics.set_ready(False)
+        drain_s = self._settings.drain_s
+        self._rest.stop(drain_s)
+        self._grpc.stop(drain_s)
+        if not self.executor.stop(drain_s):
+            _logger.warning("work was still under way after %s s and was dropped", drain_s)
