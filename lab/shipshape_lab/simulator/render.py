@@ -1,4 +1,4 @@
-"""A contact sheet of vessel meshes, ray-cast with Lambert shading: generated types, and real meshes beside them.
+"""A contact sheet of ray-cast vessels with Lambert shading: generated types, real meshes beside them.
 
 python -m shipshape_lab.simulator.render --out out/vessels.png --real path/to/meshes
 """
@@ -25,9 +25,7 @@ VIEWPOINTS = (
 _SUN = np.array([0.35, -0.55, 0.75]) / np.linalg.norm([0.35, -0.55, 0.75])
 
 
-def render(
-    mesh: trimesh.Trimesh, azimuth_deg: float, elevation_deg: float, *, width: int = 480
-) -> np.ndarray:
+def render(mesh: trimesh.Trimesh, azimuth_deg: float, elevation_deg: float, *, width: int = 480) -> np.ndarray:
     """Parallel-projection picture of a mesh in the vessel frame.
 
     Args:
@@ -74,9 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Command line: render every vessel type, and the real meshes of a folder if one is given."""
     options = _parser().parse_args(argv)
     names = [(name, seed) for name in VESSEL_TYPES for seed in (None, *range(options.sisters))]
-    meshes = [
-        (name if seed is None else f"{name} #{seed}", build_vessel(name, seed).mesh) for name, seed in names
-    ]
+    meshes = [(name if seed is None else f"{name} #{seed}", build_vessel(name, seed).mesh) for name, seed in names]
     meshes += _real_meshes(options.real)
     contact_sheet(meshes, options.out, width=options.width)
     sys.stdout.write(f"Wrote {len(meshes)} vessels to {options.out}.\n")
@@ -112,7 +108,7 @@ def _cut(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def _camera(azimuth: float, elevation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit vectors towards the eye, to the right and up, for an eye at an azimuth and elevation in radians."""
+    """Unit vectors towards the eye, to the right and up, for an eye at these angles in radians."""
     cos, sin = np.cos(azimuth), np.sin(azimuth)
     eye = np.array([np.cos(elevation) * cos, np.cos(elevation) * sin, np.sin(elevation)])
     right = np.array([-sin, cos, 0.0])

@@ -1,6 +1,6 @@
-"""Fishing boat, about 16 m: strong sheer, deep bulwarks, wheelhouse forward of amidships, mast, derrick, gallows."""
+"""Fishing boat, about 16 m: strong sheer, deep bulwarks, wheelhouse amidships, mast, derrick, gallows."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from shipshape_lab.simulator.vessels import fittings as fit
 from shipshape_lab.simulator.vessels.house import House
@@ -15,14 +15,24 @@ class FishingBoat:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=15.8, beam=5.2, bow_height=3.4, mid_height=1.75, stern_height=2.05, bulwark=0.85, bow_rake=1.5,
-            stern_rake=0.4, transom=0.75, waterline=0.92, shoulder=0.5, fullness=2.6, entry=1.8, flare=1.3,
+            length=15.8,
+            beam=5.2,
+            bow_height=3.4,
+            mid_height=1.75,
+            stern_height=2.05,
+            bulwark=0.85,
+            bow_rake=1.5,
+            stern_rake=0.4,
+            transom=0.75,
+            waterline=0.92,
+            shoulder=0.5,
+            fullness=2.6,
+            entry=1.8,
+            flare=1.3,
         )
-    )  # fmt: skip
+    )
     house: House = field(
-        default_factory=lambda: House(
-            0.5, 3.4, 3.0, 3.2, front_rake=-0.1, tumblehome=0.08, taper=0.9, facet=0.3
-        )
+        default_factory=lambda: House(0.5, 3.4, 3.0, 3.2, front_rake=-0.1, tumblehome=0.08, taper=0.9, facet=0.3)
     )
     trunk: House = field(
         default_factory=lambda: House(0.38, 2.2, 2.6, 1.5, front_rake=0.0, tumblehome=0.05, taper=1.0)
@@ -42,19 +52,28 @@ class FishingBoat:
     crew: int = 1
 
     def build(self) -> Shape:
-        """The whole boat, before it is cut at the waterline."""
+        """The whole vessel, before it is cut at the waterline."""
+        house = self.house.fitted(self.hull, gangway=0.5)
+        trunk = replace(self.trunk, width=min(self.trunk.width, house.width - 0.1))
+        return replace(self, house=house, trunk=trunk)._assembled()
+
+    def _assembled(self) -> Shape:
         parts = [self.hull.shape(), self.hull.strake(0.09), self.hull.strake(0.07, drop=0.9), *self._houses()]
         parts += [*self._mast(), *self._working_deck(), *self._stern_gear(), *self._bow_gear()]
         return joined(parts)
 
+    def _floor(self) -> float:
+        """Deck under the wheelhouse, metres above water."""
+        return self.house.foot(self.hull)
+
     def _houses(self) -> list[Shape]:
-        floor = self.hull.deck(0.45)
+        floor = self._floor()
         front = self.house.glazed(sill=0.6, head=0.88, brow=0.2).moved(x=self.hull.x(self.house.aft), z=floor)
         rear = self.trunk.plain().moved(x=self.hull.x(self.house.aft) - self.trunk.length + 0.1, z=floor)
         return [front, rear]
 
     def _mast(self) -> list[Shape]:
-        x, z = self.hull.x(self.house.aft) + 0.5, self.hull.deck(0.45) + self.house.height
+        x, z = self.hull.x(self.house.aft) + 0.5, self._floor() + self.house.height
         top = z + self.mast_height
         parts = [fit.pole_mast(self.mast_height, foot=0.11, spread=0.8).moved(x=x, z=z)]
         parts += [
@@ -86,9 +105,7 @@ class FishingBoat:
                 )
             )
         for i in range(self.crew):
-            parts.append(
-                fit.standing().moved(x=self.hull.x(0.25 - 0.08 * i), y=-1.2 + 2.2 * (i % 2), z=floor)
-            )
+            parts.append(fit.standing().moved(x=self.hull.x(0.25 - 0.08 * i), y=-1.2 + 2.2 * (i % 2), z=floor))
         return parts
 
     def _stern_gear(self) -> list[Shape]:
@@ -101,7 +118,7 @@ class FishingBoat:
         if self.has_drum:
             parts.append(fit.winch(1.8, 0.65).moved(x=x + 0.9, z=floor + 0.3))
         if self.has_tyres:
-            parts.append(fit.tyres(self.hull.edge(0.1, 0.6, count=4) - [0, 0, 0.6], 0.35))
+            parts.append(fit.tyres(self.hull.below_edge(0.1, 0.6, drop=0.6, count=4), 0.35))
         return parts
 
     def _bow_gear(self) -> list[Shape]:

@@ -1,4 +1,4 @@
-"""Deck gear shared by many types: rails, masts, radars, antennas, crew, winches, bitts, fenders, outboards."""
+"""Deck gear shared by many types: rails, masts, radars, antennas, crew, winches, fenders, outboards."""
 
 import numpy as np
 

@@ -56,54 +56,75 @@ class Hull:
         """Half breadth at the cap, metres, at t."""
         return self.beam / 2 * _plan(np.asarray(t, float), self, self.transom, self.fullness)
 
+    def skin(self, t: np.ndarray, level: np.ndarray | float) -> np.ndarray:
+        """Points (..., 3) of the port side at station t and at a share of its height; the shapes broadcast."""
+        t, level = np.broadcast_arrays(np.asarray(t, float), np.asarray(level, float))
+        wet = self.beam / 2 * min(self.waterline, 0.99) * _plan(t, self, self.transom * 0.95, self.entry)
+        half = wet + (self.half_beam(t) - wet) * level**self.flare
+        return np.stack([self._along(t, level), half, self.cap_height(t) * level], axis=-1)
+
+    def reach(self, x: float, z: float) -> float:
+        """Half breadth of the outer side at x and z, metres; 0 ahead of the stem."""
+        t = np.linspace(0.0, 1.0, 40)
+        points = self.skin(t, np.clip(z / self.cap_height(t), 0.0, 1.0))
+        return float(np.interp(x, points[:, 0], points[:, 1], right=0.0))
+
     def edge(self, start: float, end: float, *, count: int = 12, inset: float = 0.0) -> np.ndarray:
         """Points (count, 3) along the port cap from t = start to t = end, `inset` metres inboard."""
+        points = self.skin(np.linspace(start, end, count), 1.0)
+        points[:, 1] = np.maximum(points[:, 1] - inset, 0.0)
+        return points
+
+    def below_edge(self, start: float, end: float, *, drop: float, count: int = 12) -> np.ndarray:
+        """Points (count, 3) along the port side, `drop` metres below the cap."""
         t = np.linspace(start, end, count)
-        half = np.maximum(self.half_beam(t) - inset, 0.0)
-        return np.stack([self.length * (t - 0.5), half, self.cap_height(t)], axis=1)
+        return self.skin(t, np.maximum(1.0 - drop / self.cap_height(t), 0.0))
 
     def shape(self) -> Shape:
         """The bare hull: sides, transom, cap, inside of the bulwark, deck and a floor on the waterline."""
         sections = self._sections()
         skin = Shape(sections.reshape(-1, 3), grid_faces(len(sections), sections.shape[1]))
-        return joined([both_sides(skin), self._transom(sections[0]), self._transom(sections[-1])])
+        return joined([both_sides(skin), _across(sections[0]), _across(sections[-1])])
 
     def strake(self, radius: float, *, drop: float = 0.15, end: float = 0.97) -> Shape:
         """A rubbing strake on both sides, `drop` metres below the cap."""
-        path = self.edge(0.0, end, count=16) - np.array([0.0, 0.0, drop])
-        return both_sides(tube(path, radius, sides=6))
+        return both_sides(tube(self.below_edge(0.01, end, drop=drop, count=16), radius, sides=6))
+
+    def raised_deck(self, start: float, *, drop: float = 0.08) -> Shape:
+        """A deck from t = start to the stem, `drop` metres below the cap, closed aft down to the main deck."""
+        lid = self.edge(start, 1.0, count=14, inset=0.05) - np.array([0.0, 0.0, drop])
+        foot = self.below_edge(start, start, drop=self.bulwark, count=1) - np.array([0.0, 0.05, 0.0])
+        lid = np.concatenate([np.column_stack([lid[:1, 0], foot[:, 1:]]), lid])
+        return _across(lid)
 
     def _sections(self) -> np.ndarray:
         """Port half sections (stations, points, 3), from the keel line up, over the cap and to the centreline."""
-        t = (
-            1.0 - (1.0 - np.linspace(0.0, 1.0, _STATIONS)) ** 1.25
-        )  # closer together at the bow, where they bend
-        level = np.linspace(0.0, 1.0, _LEVELS)
-        wet = self.beam / 2 * min(self.waterline, 0.99) * _plan(t, self, self.transom * 0.95, self.entry)
-        dry, cap = self.half_beam(t), self.cap_height(t)
-        half = wet[:, None] + (dry - wet)[:, None] * level**self.flare
-        outer = np.stack([self._along(t, level), half, cap[:, None] * level], axis=-1)
-        return np.concatenate([_flat(outer[:, :1]), outer, self._inside(t, cap)], axis=1)
+        t = 1.0 - (1.0 - np.linspace(0.0, 1.0, _STATIONS)) ** 1.25  # closer together at the bow, where they bend
+        outer = self.skin(t[:, None], np.linspace(0.0, 1.0, _LEVELS))
+        return np.concatenate([_flat(outer[:, :1]), outer, self._inside(t)], axis=1)
 
-    def _inside(self, t: np.ndarray, cap: np.ndarray) -> np.ndarray:
+    def _inside(self, t: np.ndarray) -> np.ndarray:
+        """Inner edge of the cap, foot of the bulwark and middle of the deck, (stations, 3, 3)."""
         thick = min(0.12, 0.025 * self.beam)
-        shrunk = np.clip(t, thick / self.length, 1.0 - 2.0 * thick / self.length)
-        inner = np.maximum(self.half_beam(shrunk) - thick, 0.0)
-        x = self.length * (shrunk - 0.5)
-        top = np.stack([x, inner, cap], axis=1)
-        foot = np.stack([x, inner, cap - self.bulwark], axis=1)
-        return np.concatenate([top[:, None], foot[:, None], _flat(foot[:, None])], axis=1)
+        t = np.clip(t, thick / self.length, 1.0 - 2.0 * thick / self.length)
+        top = self.skin(t, 1.0)
+        foot = self.skin(t, np.maximum(1.0 - self.bulwark / top[:, 2], 0.0))  # the side leans in below the cap
+        foot[:, 0] = np.clip(foot[:, 0], top[0, 0], top[-1, 0])
+        top[:, 1] = np.maximum(top[:, 1] - thick, 0.0)
+        foot[:, 1] = np.maximum(np.minimum(foot[:, 1] - thick, top[:, 1]), 0.0)
+        return np.stack([top, foot, _flat(foot)], axis=1)
 
     def _along(self, t: np.ndarray, level: np.ndarray) -> np.ndarray:
-        """X of every (station, level): ends lean by the rakes, and the leaning one still spans the length."""
+        """X of stations t: the ends lean by the rakes, and the hull still spans its length over all."""
         stern = -self.length / 2 + np.where(self.stern_rake > 0, 1.0 - level, level) * abs(self.stern_rake)
         stem = self.length / 2 - (1.0 - level) * self.bow_rake
-        return stern + t[:, None] * (stem - stern)
+        return stern + t * (stem - stern)
 
-    def _transom(self, section: np.ndarray) -> Shape:
-        """The wall across one end section, and across the inside of its bulwark."""
-        rows = np.stack([section, section * np.array([1.0, -1.0, 1.0])])
-        return Shape(rows.reshape(-1, 3), grid_faces(2, len(section)))
+
+def _across(points: np.ndarray) -> Shape:
+    """The wall between a line of port points and its mirror image: a transom, or a deck."""
+    rows = np.stack([points, points * np.array([1.0, -1.0, 1.0])])
+    return Shape(rows.reshape(-1, 3), grid_faces(2, len(points)))
 
 
 def _flat(points: np.ndarray) -> np.ndarray:

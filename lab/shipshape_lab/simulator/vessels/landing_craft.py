@@ -1,6 +1,6 @@
 """Landing craft, about 18 m: square bow closed by a ramp, high side walls about an open well, house aft."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,14 +17,25 @@ class LandingCraft:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=18.0, beam=5.4, bow_height=2.3, mid_height=1.8, stern_height=1.8, bulwark=1.15, bow_rake=1.3,
-            stern_rake=-0.2, transom=0.96, waterline=0.96, shoulder=0.7, fullness=2.0, entry=2.0, bow_breadth=0.8, flare=1.0,
+            length=18.0,
+            beam=5.4,
+            bow_height=2.3,
+            mid_height=1.8,
+            stern_height=1.8,
+            bulwark=1.15,
+            bow_rake=1.3,
+            stern_rake=-0.2,
+            transom=0.96,
+            waterline=0.96,
+            shoulder=0.7,
+            fullness=2.0,
+            entry=2.0,
+            bow_breadth=0.8,
+            flare=1.0,
         )
-    )  # fmt: skip
+    )
     house: House = field(
-        default_factory=lambda: House(
-            0.06, 2.6, 3.2, 2.7, front_rake=0.1, tumblehome=0.08, taper=1.0, facet=0.05
-        )
+        default_factory=lambda: House(0.06, 2.6, 3.2, 2.7, front_rake=0.1, tumblehome=0.08, taper=1.0, facet=0.05)
     )
     engine_deck: float = 4.6  # m, length of the raised deck aft
     ramp_height: float = 2.9  # m above water
@@ -41,6 +52,9 @@ class LandingCraft:
 
     def build(self) -> Shape:
         """The whole vessel, before it is cut at the waterline."""
+        return replace(self, house=self.house.fitted(self.hull))._assembled()
+
+    def _assembled(self) -> Shape:
         hull = [
             self.hull.shape(),
             self.hull.strake(0.1, drop=0.3, end=0.99),
@@ -53,22 +67,26 @@ class LandingCraft:
         """Box-like sides: their inner faces stand `side_wall` metres inside the cap, down to the deck."""
         cap = self.hull.edge(0.02, 0.97, count=10)
         cap[:, 1] -= 0.01
-        inner = cap - [0.0, self.side_wall, 0.0]
-        drop = [0.0, 0.0, self.hull.bulwark]
-        return both_sides(loft(np.stack([cap, cap - drop, inner - drop, inner], axis=1)))
+        foot = self.hull.below_edge(0.02, 0.97, drop=self.hull.bulwark, count=10)
+        foot[:, 1] -= 0.05
+        inner = cap.copy()
+        inner[:, 1] = np.minimum(cap[:, 1], foot[:, 1]) - self.side_wall
+        inner_foot = np.column_stack([inner[:, :2], foot[:, 2]])
+        return both_sides(loft(np.stack([cap, foot, inner_foot, inner], axis=1)))
 
     def _ramp(self) -> Shape:
         x, half = self.hull.x(1.0) - 0.2, self.hull.beam * min(self.hull.bow_breadth, 1.0) / 2
         foot = np.array([[0.0, half], [-0.15, half], [-0.15, -half], [0.0, -half]])
-        low = np.column_stack([foot + [x - self.hull.bow_rake * 0.6, 0.0], np.full(4, 0.5)])
-        high = np.column_stack([foot * [1.0, 0.95] + [x + self.ramp_lean, 0.0], np.full(4, self.ramp_height)])
+        low = np.column_stack([foot[:, 0] + x - self.hull.bow_rake * 0.6, foot[:, 1], np.full(4, 0.5)])
+        high = np.column_stack([foot[:, 0] + x + self.ramp_lean, foot[:, 1] * 0.95, np.full(4, self.ramp_height)])
         post = rod((x - 0.6, half, 1.0), (x - 0.6, half, self.ramp_height + 0.1), 0.15)
         return joined([loft(np.stack([low, high])), both_sides(post)])
 
     def _after_part(self) -> list[Shape]:
         height = self.hull.bulwark
         x, floor = self.hull.x(0.015) + self.engine_deck / 2, self.hull.deck(0.1)
-        deck = block(self.engine_deck, self.hull.beam * 0.94, height).moved(x=x, z=floor)
+        half = min(self.hull.reach(self.hull.x(0.03), floor), float(self.hull.half_beam(0.0))) - 0.1
+        deck = block(self.engine_deck, 2.0 * half, height).moved(x=x, z=floor)
         house = self.house.glazed(sill=0.55, head=0.87, brow=0.15)
         path = self.hull.edge(0.01, 0.27, count=6, inset=0.1)
         return [
@@ -97,8 +115,6 @@ class LandingCraft:
             parts += [body, cab.moved(x=x - 0.2, z=floor + 0.4 + self.cargo_height * 0.55)]
         for i in range(self.crates):
             parts.append(
-                block(1.2, 1.0, 1.0).moved(
-                    x=self.hull.x(0.36 + 0.08 * (i // 2)), y=0.9 - 1.8 * (i % 2), z=floor
-                )
+                block(1.2, 1.0, 1.0).moved(x=self.hull.x(0.36 + 0.08 * (i // 2)), y=0.9 - 1.8 * (i % 2), z=floor)
             )
         return parts

@@ -1,6 +1,6 @@
-"""Patrol boat, about 27 m: long fine hull, raked bridge, lattice mast, gun forward, boat ramp or tender aft."""
+"""Patrol boat, about 27 m: long fine hull, raked bridge, lattice mast, gun forward, tender aft."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,10 +17,22 @@ class PatrolBoat:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=27.5, beam=5.9, bow_height=3.5, mid_height=2.2, stern_height=2.1, bulwark=0.1, bow_rake=3.0,
-            stern_rake=-0.3, transom=0.85, waterline=0.86, shoulder=0.4, fullness=2.0, entry=1.4, flare=1.7,
+            length=27.5,
+            beam=5.9,
+            bow_height=3.5,
+            mid_height=2.2,
+            stern_height=2.1,
+            bulwark=0.1,
+            bow_rake=3.0,
+            stern_rake=-0.3,
+            transom=0.85,
+            waterline=0.86,
+            shoulder=0.4,
+            fullness=2.0,
+            entry=1.4,
+            flare=1.7,
         )
-    )  # fmt: skip
+    )
     lower: House = field(
         default_factory=lambda: House(
             0.28, 11.5, 4.3, 2.3, front_rake=1.1, aft_rake=0.2, tumblehome=0.35, taper=0.75, facet=0.4
@@ -47,6 +59,10 @@ class PatrolBoat:
 
     def build(self) -> Shape:
         """The whole vessel, before it is cut at the waterline."""
+        lower = self.lower.fitted(self.hull, gangway=0.5)
+        return replace(self, lower=lower, bridge=self.bridge.carried(lower, self.hull))._assembled()
+
+    def _assembled(self) -> Shape:
         hull = [self.hull.shape(), self.hull.strake(0.07, drop=0.25)]
         return joined(
             [*hull, *self._houses(), *self._mast(), *self._rails(), *self._fore_deck(), *self._after_deck()]
@@ -54,19 +70,17 @@ class PatrolBoat:
 
     def _floors(self) -> tuple[float, float]:
         """Floors of the lower house and of the bridge, metres above water."""
-        low = self.hull.deck(0.4)
+        low = self.lower.foot(self.hull)
         return low, low + self.lower.height
 
     def _houses(self) -> list[Shape]:
         low, high = self._floors()
         lower = self.lower.plain().moved(x=self.hull.x(self.lower.aft), z=low)
-        bridge = self.bridge.glazed(sill=0.45, head=0.85, brow=0.15).moved(
-            x=self.hull.x(self.bridge.aft), z=high
-        )
+        bridge = self.bridge.glazed(sill=0.45, head=0.85, brow=0.15).moved(x=self.hull.x(self.bridge.aft), z=high)
         return [lower, bridge]
 
     def _mast(self) -> list[Shape]:
-        z = sum(self._floors()[1:]) + self.bridge.height
+        z = self._floors()[1] + self.bridge.height
         x = self.hull.x(self.bridge.aft) + self.mast_at * self.bridge.length
         parts = [fit.lattice_mast(self.mast_height, stance=1.3, lean=0.9).moved(x=x, z=z)]
         parts.append(fit.open_radar(2.0).moved(x=x - 0.9, z=z + 0.81 * self.mast_height))
@@ -93,8 +107,12 @@ class PatrolBoat:
 
     def _after_deck(self) -> list[Shape]:
         x, z = self.hull.x(self.tender_at), self.hull.deck(0.12)
-        parts = [fit.raft_canister().moved(x=self.hull.x(self.lower.aft) + 0.8 + 1.3 * (i // 2), y=1.3 - 2.6 * (i % 2), z=self._floors()[1])
-                 for i in range(self.rafts)]  # fmt: skip
+        parts = [
+            fit.raft_canister().moved(
+                x=self.hull.x(self.lower.aft) + 0.8 + 1.3 * (i // 2), y=1.3 - 2.6 * (i % 2), z=self._floors()[1]
+            )
+            for i in range(self.rafts)
+        ]
         if self.has_tender:
             half = self.tender_length / 2
             side = tube(self._tender_edge(), 0.22, sides=6)

@@ -1,6 +1,6 @@
-"""Pilot boat, about 16 m: low fast hull with fenders, wheelhouse near amidships, boarding deck and handrails."""
+"""Pilot boat, about 16 m: low fast hull with fenders, wheelhouse amidships, handrails."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from shipshape_lab.simulator.vessels import fittings as fit
 from shipshape_lab.simulator.vessels.house import House
@@ -15,10 +15,22 @@ class PilotBoat:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=15.6, beam=4.8, bow_height=2.2, mid_height=1.45, stern_height=1.4, bulwark=0.06, bow_rake=1.7,
-            stern_rake=-0.2, transom=0.9, waterline=0.86, shoulder=0.45, fullness=2.4, entry=1.6, flare=1.5,
+            length=15.6,
+            beam=4.8,
+            bow_height=2.2,
+            mid_height=1.45,
+            stern_height=1.4,
+            bulwark=0.06,
+            bow_rake=1.7,
+            stern_rake=-0.2,
+            transom=0.9,
+            waterline=0.86,
+            shoulder=0.45,
+            fullness=2.4,
+            entry=1.6,
+            flare=1.5,
         )
-    )  # fmt: skip
+    )
     house: House = field(
         default_factory=lambda: House(
             0.33, 4.9, 3.3, 2.5, front_rake=0.9, aft_rake=0.15, tumblehome=0.3, taper=0.85, facet=0.35
@@ -39,7 +51,11 @@ class PilotBoat:
     crew: int = 1
 
     def build(self) -> Shape:
-        """The whole boat, before it is cut at the waterline."""
+        """The whole vessel, before it is cut at the waterline."""
+        trunk = self.trunk.fitted(self.hull, gangway=0.5)
+        return replace(self, house=self.house.fitted(self.hull, gangway=0.5), trunk=trunk)._assembled()
+
+    def _assembled(self) -> Shape:
         hull = [
             self.hull.shape(),
             self.hull.strake(self.fender, drop=0.1),
@@ -48,7 +64,7 @@ class PilotBoat:
         return joined([*hull, *self._houses(), *self._roof(), *self._rails(), *self._deck_gear()])
 
     def _houses(self) -> list[Shape]:
-        front = self.trunk.plain().moved(x=self.hull.x(self.trunk.aft), z=self.hull.deck(0.65))
+        front = self.trunk.plain().moved(x=self.hull.x(self.trunk.aft), z=self.trunk.foot(self.hull))
         return [
             front,
             self.house.glazed(sill=0.5, head=0.87, brow=0.12).moved(
@@ -57,7 +73,7 @@ class PilotBoat:
         ]
 
     def _floor(self) -> float:
-        return self.hull.deck(0.45)
+        return self.house.foot(self.hull)
 
     def _roof(self) -> list[Shape]:
         x = self.hull.x(self.house.aft) + self.mast_at * self.house.length
@@ -91,8 +107,6 @@ class PilotBoat:
             parts.append(fit.raft_canister().moved(x=self.hull.x(0.27), y=1.3, z=floor))
         for i in range(self.crew):
             parts.append(
-                fit.standing().moved(
-                    x=self.hull.x(0.68 + 0.05 * i), y=1.5 - 3.0 * (i % 2), z=self.hull.deck(0.66)
-                )
+                fit.standing().moved(x=self.hull.x(0.68 + 0.05 * i), y=1.5 - 3.0 * (i % 2), z=self.hull.deck(0.66))
             )
         return parts

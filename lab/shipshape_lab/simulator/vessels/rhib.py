@@ -16,10 +16,20 @@ class Rhib:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=8.6, beam=2.5, bow_height=1.15, mid_height=0.62, stern_height=0.62, bulwark=0.16, bow_rake=1.1,
-            transom=0.95, waterline=0.82, shoulder=0.55, fullness=2.6, entry=1.8,
+            length=8.6,
+            beam=2.5,
+            bow_height=1.15,
+            mid_height=0.62,
+            stern_height=0.62,
+            bulwark=0.16,
+            bow_rake=1.1,
+            transom=0.95,
+            waterline=0.82,
+            shoulder=0.55,
+            fullness=2.6,
+            entry=1.8,
         )
-    )  # fmt: skip
+    )
     collar: float = 0.27  # m, radius of the tube
     console_at: float = 0.46  # t of the console
     console_height: float = 1.15  # m
@@ -38,9 +48,7 @@ class Rhib:
 
     def build(self) -> Shape:
         """The whole boat, before it is cut at the waterline."""
-        return joined(
-            [self.hull.shape(), self._collar(), *self._cockpit(), *self._aft_gear(), *self._bow_gear()]
-        )
+        return joined([self.hull.shape(), self._collar(), *self._cockpit(), *self._aft_gear(), *self._bow_gear()])
 
     def _collar(self) -> Shape:
         path = self.hull.edge(-0.03, 0.965, count=22, inset=self.collar * 0.3)
@@ -54,7 +62,9 @@ class Rhib:
         console = block(0.8, self.console_width, self.console_height, chamfer=0.12).moved(x=x, z=floor)
         pane = block(0.06, self.console_width * 0.8, self.screen).moved(x=x + 0.2, z=top)
         parts = [console, pane]
-        for place in range(2 * self.rows):
+        room = (self.console_at - self.arch_at) * self.hull.length - 1.3  # seats end ahead of the arch
+        rows = min(self.rows, 1 + int(room / self.row_gap))
+        for place in range(2 * rows):
             at = {"x": x - 0.95 - self.row_gap * (place // 2), "y": 0.42 - 0.84 * (place % 2), "z": floor}
             parts.append(block(0.6, 0.36, 0.62, chamfer=0.05).moved(**at))
             parts.append(block(0.08, 0.36, 0.45).moved(x=at["x"] - 0.3, y=at["y"], z=floor + 0.6))

@@ -1,6 +1,6 @@
 """Sailing yacht under bare poles, about 11 m: fine hull, coachroof, cockpit, mast, boom, rigging, pulpits."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,10 +17,22 @@ class SailingYacht:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=11.5, beam=3.5, bow_height=1.4, mid_height=1.1, stern_height=1.12, bulwark=0.06, bow_rake=1.0,
-            stern_rake=-0.6, transom=0.7, waterline=0.78, shoulder=0.4, fullness=2.0, entry=1.5, flare=1.2,
+            length=11.5,
+            beam=3.5,
+            bow_height=1.4,
+            mid_height=1.1,
+            stern_height=1.12,
+            bulwark=0.06,
+            bow_rake=1.0,
+            stern_rake=-0.6,
+            transom=0.7,
+            waterline=0.78,
+            shoulder=0.4,
+            fullness=2.0,
+            entry=1.5,
+            flare=1.2,
         )
-    )  # fmt: skip
+    )
     coachroof: House = field(
         default_factory=lambda: House(0.38, 4.4, 1.9, 0.42, front_rake=1.5, taper=0.55, tumblehome=0.2)
     )
@@ -37,8 +49,11 @@ class SailingYacht:
     crew: int = 2
 
     def build(self) -> Shape:
-        """The whole boat, before it is cut at the waterline."""
-        roof = self.coachroof.plain().moved(x=self.hull.x(self.coachroof.aft), z=self.hull.deck(0.5))
+        """The whole vessel, before it is cut at the waterline."""
+        return replace(self, coachroof=self.coachroof.fitted(self.hull, gangway=0.4))._assembled()
+
+    def _assembled(self) -> Shape:
+        roof = self.coachroof.plain().moved(x=self.hull.x(self.coachroof.aft), z=self.coachroof.foot(self.hull))
         lifelines = fit.rails(self.hull.edge(0.03, 0.97, count=11, inset=0.1), self.rail_height, wires=2)
         return joined([self.hull.shape(), roof, lifelines, *self._rig(), *self._cockpit(), *self._covers()])
 
@@ -65,8 +80,12 @@ class SailingYacht:
         side = self.hull.beam * 0.27
         coaming = both_sides(block(3.2, 0.25, self.coaming, chamfer=0.05).moved(x=x, y=side, z=z))
         wheel = rod((x - 0.8, 0.0, z + 0.6), (x - 0.75, 0.0, z + 0.6), 0.45, 12)
-        people = [fit.seated(1.2).turned(1.57 - 3.14 * (i % 2)).moved(x=x + 0.7 * (i // 2), y=side * (-1 + 2 * (i % 2)), z=z)
-                  for i in range(self.crew)]  # fmt: skip
+        people = [
+            fit.seated(1.2)
+            .turned(1.57 - 3.14 * (i % 2))
+            .moved(x=x + 0.7 * (i // 2), y=side * (-1 + 2 * (i % 2)), z=z)
+            for i in range(self.crew)
+        ]
         return [coaming, wheel, cone(0.12, 0.1, 0.8).moved(x=x - 0.6, z=z), *people]
 
     def _covers(self) -> list[Shape]:
@@ -77,7 +96,5 @@ class SailingYacht:
         if self.bimini:
             x, z = self.hull.x(0.18), self.hull.deck(0.18)
             parts.append(block(1.9, 2.0, 0.08, chamfer=0.05).moved(x=x, z=z + 1.95))
-            parts.append(
-                both_sides(rods([[[x + e, 1.0, z], [x + e, 0.95, z + 1.95]] for e in (-0.8, 0.8)], 0.02))
-            )
+            parts.append(both_sides(rods([[[x + e, 1.0, z], [x + e, 0.95, z + 1.95]] for e in (-0.8, 0.8)], 0.02)))
         return parts

@@ -28,9 +28,7 @@ class Shape:
     def turned(self, yaw: float) -> "Shape":
         """The same shape turned about its own z axis, radians, counter-clockwise from above."""
         cos, sin = np.cos(yaw), np.sin(yaw)
-        return Shape(
-            self.vertices @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]), self.faces
-        )
+        return Shape(self.vertices @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]), self.faces)
 
 
 def joined(shapes: Iterable[Shape]) -> Shape:

@@ -1,6 +1,6 @@
 """Small passenger ferry, about 20 m: long two-deck cabin with rows of windows, wheelhouse forward on top."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,10 +17,22 @@ class SmallFerry:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=20.5, beam=6.2, bow_height=2.3, mid_height=1.6, stern_height=1.6, bulwark=0.5, bow_rake=1.3,
-            stern_rake=0.3, transom=0.88, waterline=0.92, shoulder=0.55, fullness=2.8, entry=1.9, flare=1.3,
+            length=20.5,
+            beam=6.2,
+            bow_height=2.3,
+            mid_height=1.6,
+            stern_height=1.6,
+            bulwark=0.5,
+            bow_rake=1.3,
+            stern_rake=0.3,
+            transom=0.88,
+            waterline=0.92,
+            shoulder=0.55,
+            fullness=2.8,
+            entry=1.9,
+            flare=1.3,
         )
-    )  # fmt: skip
+    )
     cabin: House = field(
         default_factory=lambda: House(
             0.12, 13.2, 5.2, 2.6, front_rake=0.8, aft_rake=0.1, tumblehome=0.1, taper=0.85, facet=0.5
@@ -44,6 +56,10 @@ class SmallFerry:
 
     def build(self) -> Shape:
         """The whole vessel, before it is cut at the waterline."""
+        cabin = self.cabin.fitted(self.hull, gangway=0.35)
+        return replace(self, cabin=cabin, bridge=self.bridge.carried(cabin, self.hull))._assembled()
+
+    def _assembled(self) -> Shape:
         hull = [self.hull.shape(), self.hull.strake(0.12, drop=0.45)]
         return joined(
             [*hull, *self._houses(), *self._upper_deck(), *self._awning(), *self._mast(), *self._rails()]
@@ -51,7 +67,7 @@ class SmallFerry:
 
     def _upper(self) -> float:
         """Height of the upper deck, metres above water."""
-        return self.hull.deck(0.4) + self.cabin.height + 0.1
+        return self.cabin.foot(self.hull) + self.cabin.height + 0.1
 
     def _houses(self) -> list[Shape]:
         cabin = self.cabin.glazed(sill=0.45, head=0.82, brow=0.1)
@@ -59,10 +75,12 @@ class SmallFerry:
         x = self.hull.x(self.cabin.aft)
         pillars = np.linspace(0.12, 0.88, 7) * self.cabin.length
         half = self.cabin.width / 2 * (1.0 - (1.0 - self.cabin.taper) * pillars / self.cabin.length) - 0.1
-        feet = np.column_stack([pillars + x, half, np.full(7, self.hull.deck(0.4) + 0.4 * self.cabin.height)])
-        posts = both_sides(rods(np.stack([feet, feet + [0.0, 0.0, 0.45 * self.cabin.height]], axis=1), 0.09))
+        feet = np.column_stack(
+            [pillars + x, half, np.full(7, self.cabin.foot(self.hull) + 0.4 * self.cabin.height)]
+        )
+        posts = both_sides(_upright(feet, 0.45 * self.cabin.height, 0.09))
         return [
-            cabin.moved(x=x, z=self.hull.deck(0.4)),
+            cabin.moved(x=x, z=self.cabin.foot(self.hull)),
             posts,
             bridge.moved(x=self.hull.x(self.bridge.aft), z=self._upper()),
         ]
@@ -84,13 +102,13 @@ class SmallFerry:
     def _awning(self) -> list[Shape]:
         if not self.has_awning:
             return []
-        x, z, half = self.hull.x(self.bridge.aft) - self.awning, self._upper(), self.cabin.width * 0.43
-        roof = block(self.awning, 2 * half, 0.1, chamfer=0.05).moved(
-            x=x + self.awning / 2, z=z + self.awning_height
-        )
-        along = np.linspace(0.1, self.awning - 0.1, 4) + x
+        front, z, half = self.hull.x(self.bridge.aft), self._upper(), self.cabin.width * 0.43
+        length = min(self.awning, front - self.hull.x(self.cabin.aft) - 0.3)  # it stands on the cabin roof
+        x = front - length
+        roof = block(length, 2 * half, 0.1, chamfer=0.05).moved(x=x + length / 2, z=z + self.awning_height)
+        along = np.linspace(0.1, length - 0.1, 4) + x
         feet = np.column_stack([along, np.full(4, half - 0.1), np.full(4, z)])
-        posts = rods(np.stack([feet, feet + [0.0, 0.0, self.awning_height]], axis=1), 0.035)
+        posts = _upright(feet, self.awning_height, 0.035)
         return [roof, both_sides(posts)]
 
     def _mast(self) -> list[Shape]:
@@ -104,11 +122,13 @@ class SmallFerry:
 
     def _rails(self) -> list[Shape]:
         ring = self.cabin.ring(1.0, inset=0.1, rise=0.1)
-        side = np.linspace(ring[0], ring[5] - [0.3, 0.0, 0.0], 9) + [
-            self.hull.x(self.cabin.aft),
-            0.0,
-            self.hull.deck(0.4),
-        ]
+        corner = np.array([self.hull.x(self.cabin.aft), 0.0, self.cabin.foot(self.hull)])
+        side = np.linspace(ring[0], ring[5] - np.array([0.3, 0.0, 0.0]), 9) + corner
         bow = fit.rails(self.hull.edge(0.78, 0.97, count=6, inset=0.1), self.rail_height * 0.6, wires=2)
         across = np.stack([side[0], side[0] * [1.0, -1.0, 1.0]])
         return [fit.rails(side, self.rail_height, wires=3), fit.rail(across, self.rail_height, wires=3), bow]
+
+
+def _upright(feet: np.ndarray, height: float, radius: float) -> Shape:
+    """Posts of a height and radius in metres on feet (n, 3)."""
+    return rods(np.stack([feet, feet + np.array([0.0, 0.0, height])], axis=1), radius)

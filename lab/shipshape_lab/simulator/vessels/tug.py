@@ -1,6 +1,6 @@
-"""Harbour tug, about 24 m: full round bow, low after deck, two-tier house, high all-round wheelhouse, funnels."""
+"""Harbour tug, about 24 m: full round bow, low after deck, two-tier house, high wheelhouse, funnels."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from shipshape_lab.simulator.vessels import fittings as fit
 from shipshape_lab.simulator.vessels.house import House
@@ -15,19 +15,28 @@ class Tug:
 
     hull: Hull = field(
         default_factory=lambda: Hull(
-            length=24.0, beam=9.2, bow_height=4.0, mid_height=2.1, stern_height=2.3, bulwark=0.95, bow_rake=1.0,
-            stern_rake=0.5, transom=0.8, waterline=0.95, shoulder=0.5, fullness=2.6, entry=2.2, roundness=0.62, flare=1.2,
-        )
-    )  # fmt: skip
-    lower: House = field(
-        default_factory=lambda: House(
-            0.34, 9.0, 6.2, 2.7, front_rake=0.1, tumblehome=0.05, taper=0.8, facet=0.9
+            length=24.0,
+            beam=9.2,
+            bow_height=4.0,
+            mid_height=2.1,
+            stern_height=2.3,
+            bulwark=0.95,
+            bow_rake=1.0,
+            stern_rake=0.5,
+            transom=0.8,
+            waterline=0.95,
+            shoulder=0.5,
+            fullness=2.6,
+            entry=2.2,
+            roundness=0.62,
+            flare=1.2,
         )
     )
+    lower: House = field(
+        default_factory=lambda: House(0.34, 9.0, 6.2, 2.7, front_rake=0.1, tumblehome=0.05, taper=0.8, facet=0.9)
+    )
     upper: House = field(
-        default_factory=lambda: House(
-            0.45, 5.4, 4.8, 2.2, front_rake=0.1, tumblehome=0.1, taper=0.8, facet=0.7
-        )
+        default_factory=lambda: House(0.45, 5.4, 4.8, 2.2, front_rake=0.1, tumblehome=0.1, taper=0.8, facet=0.7)
     )
     bridge: House = field(
         default_factory=lambda: House(
@@ -48,6 +57,12 @@ class Tug:
 
     def build(self) -> Shape:
         """The whole vessel, before it is cut at the waterline."""
+        lower = self.lower.fitted(self.hull, gangway=0.7)
+        upper = self.upper.carried(lower, self.hull)
+        bridge = self.bridge.carried(upper, self.hull)
+        return replace(self, lower=lower, upper=upper, bridge=bridge)._assembled()
+
+    def _assembled(self) -> Shape:
         hull = [self.hull.shape(), self.hull.strake(0.25, drop=0.3), self.hull.strake(0.15, drop=1.2)]
         return joined(
             [*hull, *self._houses(), *self._funnels(), *self._mast(), *self._deck_gear(), *self._fenders()]
@@ -55,7 +70,7 @@ class Tug:
 
     def _levels(self) -> tuple[float, float, float]:
         """Floors of the three houses, metres above water."""
-        lower = self.hull.deck(0.45)
+        lower = self.lower.foot(self.hull)
         upper = lower + self.lower.height
         return lower, upper, upper + self.upper.height
 
@@ -63,9 +78,7 @@ class Tug:
         low, middle, high = self._levels()
         lower = self.lower.glazed(sill=0.62, head=0.72, brow=0.1).moved(x=self.hull.x(self.lower.aft), z=low)
         upper = self.upper.plain().moved(x=self.hull.x(self.upper.aft), z=middle)
-        bridge = self.bridge.glazed(sill=0.38, head=0.85, brow=0.3).moved(
-            x=self.hull.x(self.bridge.aft), z=high
-        )
+        bridge = self.bridge.glazed(sill=0.38, head=0.85, brow=0.3).moved(x=self.hull.x(self.bridge.aft), z=high)
         path = self.lower.ring(1.0, inset=0.15)[[0, 5, 4]] + [self.hull.x(self.lower.aft), 0.0, low]
         return [lower, upper, bridge, fit.rails(path, 1.0)]
 
@@ -74,7 +87,7 @@ class Tug:
         x = self.hull.x(self.lower.aft) + 1.2
         casing = fit.stack(self.funnel_height, length=1.5, width=1.1)
         if self.funnels:
-            return [both_sides(casing.moved(x=x, y=self.funnel_side, z=middle))]
+            return [both_sides(casing.moved(x=x, y=min(self.funnel_side, self.lower.width / 2 - 0.7), z=middle))]
         return [casing.moved(x=x, z=middle)]
 
     def _mast(self) -> list[Shape]:
@@ -103,11 +116,11 @@ class Tug:
         return parts
 
     def _fenders(self) -> list[Shape]:
-        bow = self.hull.edge(0.93, 0.995, count=5) - [0.0, 0.0, 0.4]
+        bow = self.hull.below_edge(0.93, 0.995, drop=0.4, count=5)
         stem = both_sides(joined([rod((x, y, z - 0.9), (x, y, z + 0.2), 0.35, 8) for x, y, z in bow]))
         if self.tyres == 0:
             return [stem]
         return [
             stem,
-            fit.tyres(self.hull.edge(0.08, 0.75, count=self.tyres) - [0.0, 0.0, 0.9], self.tyre_radius),
+            fit.tyres(self.hull.below_edge(0.08, 0.75, drop=0.9, count=self.tyres), self.tyre_radius),
         ]

@@ -42,14 +42,12 @@ class UsvCatamaran:
             [self.length * (s - 0.5), np.full(18, y), self.float_height + self.bow_rise * s**4], axis=1
         )
         radii = self.radius * np.minimum(1.0, np.minimum(0.45 + 5 * s, 0.12 + 2.2 * (1 - s) ** 0.7))
-        parts = [tube(path, radii, sides=10)]
+        parts = [tube(path, radii, sides=14)]
         foot = self.float_height + self.radius
         for end in (-1.0, 1.0):
             knee = (self.tray_at + end * self.leg_spread * 0.42, y * 0.8, self.tray_height * 0.8)
             parts.append(rod((end * self.leg_spread, y, foot - 0.05), knee, 0.055))
-            parts.append(
-                rod(knee, (self.tray_at + end * 0.3, self.tray_width * 0.4, self.tray_height), 0.055)
-            )
+            parts.append(rod(knee, (self.tray_at + end * 0.3, self.tray_width * 0.4, self.tray_height), 0.055))
         parts.append(block(2.3 * self.leg_spread, 0.14, 0.1).moved(y=y, z=foot - 0.05))
         if self.pods:
             parts.append(block(0.5, 0.3, 0.5, chamfer=0.06).moved(x=-self.length / 2 - 0.1, y=y, z=0.05))

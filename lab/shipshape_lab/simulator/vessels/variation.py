@@ -5,9 +5,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-SPREAD = (
-    0.12  # standard deviation of every length, height, angle and position, as a share of its nominal value
-)
+SPREAD = 0.12  # standard deviation of every length, height, angle and position, as a share of its nominal value
 CUT_OFF = 2.0  # draws beyond this many deviations are held there: past it a hull stops looking like its type
 FLIP_CHANCE = 0.25  # chance that a piece of gear is absent where the nominal hull has it, or the reverse
 
