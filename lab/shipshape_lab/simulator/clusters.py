@@ -7,12 +7,15 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from shipshape_lab.simulator.scan import Scan
 
 NOMINAL_SEED = -1
+
+Kind = TypeVar("Kind")
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class ClusterSet:
     seed: np.ndarray
     starts: np.ndarray = field(init=False, repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "starts", np.concatenate([[0], np.cumsum(self.n, dtype=np.int64)]))
 
     def __len__(self) -> int:
@@ -126,7 +129,7 @@ def load_surfaces(path: str | Path) -> Surfaces:
     return _read(Surfaces, path)
 
 
-def _read(kind, path: str | Path):
+def _read(kind: type[Kind], path: str | Path) -> Kind:
     names = [f.name for f in fields(kind) if f.init]
     with np.load(path, allow_pickle=False) as arrays:
         missing = sorted(set(names) - set(arrays.files))

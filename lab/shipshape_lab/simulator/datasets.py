@@ -10,7 +10,7 @@ Example:
 import argparse
 import hashlib
 import multiprocessing
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -122,7 +122,7 @@ def _surface(key: tuple[str, int]) -> np.ndarray:
     return sample_surface(build_vessel(name, seed), SURFACE_POINTS, rng)
 
 
-def _spread(function, items, jobs: int, title: str | None) -> list:
+def _spread(function: Callable, items: Sequence, jobs: int, title: str | None) -> list:
     bar = partial(tqdm, total=len(items), desc=title, disable=title is None)
     if jobs == 1:
         return list(bar(map(function, items)))

@@ -32,7 +32,9 @@ class Lidar:
     half_range: float
     range_noise_sd: float
 
-    def directions(self, *, azimuth: tuple[float, float], elevation: tuple[float, float], phase: float):
+    def directions(
+        self, *, azimuth: tuple[float, float], elevation: tuple[float, float], phase: float
+    ) -> np.ndarray:
         """Unit vectors of the rays inside an angular window.
 
         Args:
