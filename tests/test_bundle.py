@@ -108,3 +108,14 @@ def test_the_writer_refuses_a_model_outside_the_folder(tmp_path):
             catalogue=[CatalogueVessel("rhib", CATALOGUE[0].box)],
             models={"prior": tmp_path / "prior.onnx"},
         )
+
+
+def test_a_stage_that_misses_a_key_learns_where(folder):
+    bundle = load_bundle(folder)
+    with pytest.raises(
+        BundleError, match=r"expected parameters\.best\.scale in manifest\.toml, got temperature, edges"
+    ):
+        bundle.parameters["best"]["scale"]
+    with pytest.raises(BundleError, match=r"expected models\.heading in manifest\.toml, got prior"):
+        bundle.models["heading"]
+    assert bundle.parameters.get("paper") is None

@@ -64,11 +64,26 @@ def load_bundle(path: Path) -> Bundle:
         name=spec.name,
         digest=hashlib.sha256(content).hexdigest(),
         catalogue=tuple(vessel.to_vessel() for vessel in spec.catalogue),
-        models={name: _load_model(path, model) for name, model in spec.models.items()},
-        parameters=spec.parameters,
+        models=_Table("models", {name: _load_model(path, model) for name, model in spec.models.items()}),
+        parameters=_Table("parameters", spec.parameters),
         scores=spec.scores,
         training=spec.training,
     )
+
+
+class _Table(dict[str, Any]):
+    """A table of the manifest; a stage that misses a key in it learns that the bundle is to blame."""
+
+    def __init__(self, path: str, content: Mapping[str, Any]) -> None:
+        super().__init__((key, _as_table(f"{path}.{key}", value)) for key, value in content.items())
+        self._path = path
+
+    def __missing__(self, key: str) -> Any:
+        raise BundleError(f"expected {self._path}.{key} in {MANIFEST}, got {', '.join(self) or 'nothing'}")
+
+
+def _as_table(path: str, value: Any) -> Any:
+    return _Table(path, value) if isinstance(value, dict) else value
 
 
 class _Spec(BaseModel):
