@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from shipshape_lab.simulator.vessels import VESSEL_TYPES, build_vessel
+from shipshape_lab.simulator.vessels.shape import Shape, above_water
 
 matplotlib.use("Agg")
 
@@ -103,8 +104,9 @@ def _real_meshes(folder: Path | None) -> list[tuple[str, trimesh.Trimesh]]:
 
 
 def _cut(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """The triangles that reach above the waterline."""
-    return mesh.submesh([np.flatnonzero(mesh.triangles[:, :, 2].max(axis=1) > 0)], append=True)
+    """The part of a mesh above the waterline, so that the sizes shown compare with the generated hulls."""
+    dry = above_water(Shape(np.asarray(mesh.vertices), np.asarray(mesh.faces)))
+    return trimesh.Trimesh(dry.vertices, dry.faces, process=False)
 
 
 def _camera(azimuth: float, elevation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
