@@ -85,6 +85,10 @@ def test_stages_run_in_order_and_are_timed(executor, clock):
     assert stage_ms == {"a": 250.0, "b": 0.0}
 
 
+def test_an_endless_deadline_can_be_waited_for(executor):
+    assert executor.submit(task(Note("a"), deadline=float("inf"))).result()[0].seen == ["a"]
+
+
 def test_full_queue_refuses_at_once(executor, gate):
     for _ in range(3):
         executor.submit(task(Note("a")))

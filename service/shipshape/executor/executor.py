@@ -62,8 +62,7 @@ class Executor:
         self._open = True
         self._counts = Counts()
         self._threads = [
-            threading.Thread(target=self._work, name=f"worker-{index}", daemon=True)
-            for index in range(workers)
+            threading.Thread(target=self._work, name=f"worker-{index}", daemon=True) for index in range(workers)
         ]
         for thread in self._threads:
             thread.start()

@@ -1,5 +1,6 @@
 """A task as the caller hands it in, and the ticket the caller holds while it is computed."""
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
@@ -75,7 +76,7 @@ class Ticket(Generic[R]):
             Exception: whatever a stage raised.
         """
         try:
-            return self.future.result(self.remaining())
+            return self.future.result(min(self.remaining(), threading.TIMEOUT_MAX))
         except TimeoutError:
             if not self.settled:
                 self.expire()

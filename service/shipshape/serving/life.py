@@ -13,6 +13,7 @@ from shipshape.serving.core import Model
 from shipshape.serving.service import Service
 from shipshape.settings import Settings
 from shipshape.telemetry import configure_logging
+from shipshape.validation import ContactLimits
 
 _logger = logging.getLogger(__name__)
 DIED = 0  # in place of a signal's number
@@ -32,7 +33,7 @@ def serve(settings: Settings) -> int:
         signal.signal(number, lambda received, frame: ends.put(received))
     try:
         bundle = load_bundle(settings.bundle)
-        model = Model(bundle, Pipeline(bundle))
+        model = Model(bundle, Pipeline(bundle, ContactLimits(max_points=settings.max_points)))
         service = Service(settings, render_png, on_death=lambda: ends.put(DIED))
         addresses = service.start()
     except (BundleError, OSError) as error:

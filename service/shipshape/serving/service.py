@@ -4,6 +4,7 @@ live: the doors listen and refuse -> ready: every stage is warm -> stopping: no 
 """
 
 import logging
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -74,12 +75,13 @@ class Service:
         self._metrics.set_ready(True)
 
     def stop(self) -> None:
-        """Not ready, accept no more, let what is under way end, for up to `drain_s` seconds in all doors."""
+        """Not ready, accept no more, let what is under way end, for up to `drain_s` seconds."""
         self._core.close()
         self._grpc.close()
         self._metrics.set_ready(False)
-        drain_s = self._settings.drain_s
-        self._rest.stop(drain_s)
-        self._grpc.stop(drain_s)
-        if not self.executor.stop(drain_s):
-            _logger.warning("work was still under way after %s s and was dropped", drain_s)
+        end = time.monotonic() + self._settings.drain_s
+        grpc_stopped = self._grpc.begin_stop(self._settings.drain_s)  # both doors drain at the same time
+        self._rest.stop(self._settings.drain_s)
+        grpc_stopped.wait()
+        if not self.executor.stop(max(0.0, end - time.monotonic())):
+            _logger.warning("work was still under way after %s s and was dropped", self._settings.drain_s)

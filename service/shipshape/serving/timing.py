@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from shipshape.types import Recognition
 
+LONGEST_MS = 3_600_000.0  # a longer deadline is none: gRPC hands out centuries when the caller set nothing
+
 
 @dataclass(frozen=True, slots=True)
 class Timeouts:

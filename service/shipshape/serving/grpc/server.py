@@ -1,5 +1,6 @@
 """The gRPC door: shipshape.v1, grpc.health.v1 and reflection on one port."""
 
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import grpc
@@ -19,7 +20,7 @@ MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that t
 
 
 class GrpcDoor:
-    """Listens from `start` to `stop`; alive from the start, SERVING between `open` and `close`.
+    """Listens from `start` to `begin_stop`; alive from the start, SERVING between `open` and `close`.
 
     Args:
         core: Answers.
@@ -69,9 +70,9 @@ class GrpcDoor:
         """Tell health checks that requests are not taken."""
         self._set(health_pb2.HealthCheckResponse.NOT_SERVING)
 
-    def stop(self, drain_s: float) -> None:
-        """Accept no more, let requests under way end for up to `drain_s` seconds, then break them off."""
-        self._server.stop(drain_s).wait()
+    def begin_stop(self, drain_s: float) -> threading.Event:
+        """Accept no more; set once all under way has ended, or was broken off after `drain_s` seconds."""
+        return self._server.stop(drain_s)
 
     def _set(self, status: int) -> None:
         for service in ("", SERVICE):

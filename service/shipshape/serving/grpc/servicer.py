@@ -12,7 +12,7 @@ from shipshape.serving.encoding import check_contacts
 from shipshape.serving.faults import Fault, fault_of
 from shipshape.serving.grpc import convert
 from shipshape.serving.grpc.guard import set_trailing
-from shipshape.serving.timing import Timeouts, server_timing, summed
+from shipshape.serving.timing import LONGEST_MS, Timeouts, server_timing, summed
 from shipshape.telemetry import OK, Metrics
 from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.v1 import shipshape_pb2_grpc as pb_grpc
@@ -66,7 +66,9 @@ class Servicer(pb_grpc.ShipshapeServicer):
 
     def _deadline(self, context: grpc.ServicerContext) -> float:
         remaining = context.time_remaining()
-        return self._core.deadline_in(self._timeouts.default_ms / 1e3 if remaining is None else remaining)
+        if remaining is None or remaining > LONGEST_MS / 1e3:
+            remaining = self._timeouts.default_ms / 1e3
+        return self._core.deadline_in(remaining)
 
 
 def _cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -> None:

@@ -26,12 +26,12 @@ from shipshape.serving.rest.schemas import (
     RecogniseBody,
     ScanBody,
 )
+from shipshape.serving.timing import LONGEST_MS
 from shipshape.types import Contact, Options
 
 JSON = "application/json"
 PACKED = "application/octet-stream"
 TIMEOUT_HEADER = "Shipshape-Timeout-Ms"
-MAX_TIMEOUT_MS = 3_600_000.0
 M = TypeVar("M", bound=BaseModel)
 
 
@@ -67,8 +67,8 @@ def timeout_s(request: Request, default_ms: float) -> float:
         milliseconds = default_ms if text is None else float(text)
     except ValueError:
         milliseconds = -1.0
-    if not 0 < milliseconds <= MAX_TIMEOUT_MS:
-        raise InvalidInput(f"expected {TIMEOUT_HEADER} above 0 and up to {MAX_TIMEOUT_MS:.0f}, got {text!r:.40}")
+    if not 0 < milliseconds <= LONGEST_MS:
+        raise InvalidInput(f"expected {TIMEOUT_HEADER} above 0 and up to {LONGEST_MS:.0f}, got {text!r:.40}")
     return milliseconds / 1e3
 
 

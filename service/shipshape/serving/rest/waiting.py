@@ -14,21 +14,22 @@ async def until_settled(tickets: Sequence[Ticket[Any]], request: Request) -> Non
 
     The request's body must have been read, so that the next thing to come from the client is its leaving.
     """
+    if not tickets:
+        return
     everything: asyncio.Future[Any] = asyncio.gather(
-        *(asyncio.wrap_future(each.future) for each in tickets), return_exceptions=True
+        *(asyncio.wrap_future(ticket.future) for ticket in tickets), return_exceptions=True
     )
     gone: asyncio.Future[Any] = asyncio.ensure_future(_client_leaves(request))
-    patience = min((ticket.remaining() for ticket in tickets), default=0.0)
+    patience = min(ticket.remaining() for ticket in tickets)
     try:
         await asyncio.wait({everything, gone}, timeout=patience, return_when=asyncio.FIRST_COMPLETED)
-        for ticket in tickets:
-            if gone.done():
-                ticket.cancel()
-            else:
+        if not gone.done():
+            for ticket in tickets:
                 ticket.expire()  # does nothing to one that has its answer
     finally:
         gone.cancel()
-        everything.cancel()
+        for ticket in tickets:
+            ticket.cancel()  # does nothing to one that is settled
 
 
 async def _client_leaves(request: Request) -> None:

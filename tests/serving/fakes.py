@@ -1,0 +1,185 @@
+"""A pipeline that does what a contact's id says, a service around it, and clients of both its doors."""
+
+import threading
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import grpc
+import httpx
+import numpy as np
+import pytest
+
+from shipshape.serving.core import Model
+from shipshape.serving.service import Service
+from shipshape.settings import Settings
+from shipshape.types import (
+    Box,
+    Contact,
+    ImageMethod,
+    ImagePair,
+    Options,
+    Preset,
+    Recognition,
+    ReferenceBox,
+    RestoredCloud,
+)
+from shipshape.v1 import shipshape_pb2 as pb
+from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
+from shipshape.validation import ContactLimits, check_contact
+
+PATIENCE = 10.0
+DIGEST = "ab" * 32
+PNG = b"\x89PNG fake"
+SECRET = "the secret of the stage"
+
+
+@dataclass(frozen=True)
+class FakeVessel:
+    name: str
+    box: ReferenceBox
+
+
+@dataclass(frozen=True)
+class FakeBundle:
+    name: str = "fake"
+    digest: str = DIGEST
+    catalogue: tuple = (FakeVessel("tug", ReferenceBox(20, 8, 10)), FakeVessel("rhib", ReferenceBox(9, 2.5, 3)))
+    scores: dict = field(default_factory=lambda: {"p": {"accuracy": 0.99}, "note": "made up"})
+
+
+@dataclass(frozen=True)
+class FakeStage:
+    name: str
+    run: object
+
+
+@dataclass
+class FakeWork:
+    contact: Contact
+    options: Options
+
+
+class FakePipeline:
+    """Contact ids that mean something: "hold" waits for `release`, "crash" fails."""
+
+    def __init__(self):
+        self.entered = threading.Semaphore(0)
+        self.release = threading.Event()
+        self.computed = []
+        self.stages = (FakeStage("prior", self._prior), FakeStage("heading", lambda work: None))
+
+    def begin(self, contact, options):
+        check_contact(contact, ContactLimits())
+        return FakeWork(contact, options)
+
+    def finish(self, work, stage_ms):
+        self.computed.append(work.contact.contact_id)
+        return recognition_of(work, dict(stage_ms))
+
+    def _prior(self, work):
+        if work.contact.contact_id == "crash":
+            raise RuntimeError(SECRET)
+        if work.contact.contact_id == "hold":
+            self.entered.release()
+            assert self.release.wait(PATIENCE)
+
+
+def recognition_of(work, stage_ms):
+    points = work.contact.points_level
+    own = work.contact.own_true_heading_deg
+    paper = work.options.preset is Preset.PAPER
+    image = np.arange(64 * 64 * 3, dtype=np.uint32).astype(np.uint8).reshape(64, 64, 3)
+    return Recognition(
+        vessel="tug",
+        probability=0.75,
+        probabilities={"tug": 0.75, "rhib": 0.125, "unknown": 0.125},
+        unknown=False,
+        heading=0.5,
+        heading_std=0.0625,
+        bow_probability=0.875,
+        aspect_deg=30.0,
+        true_heading_deg=None if own is None else own % 360,
+        box=Box((40.0, 1.5, -2.0), ReferenceBox(20, 8, 10)),
+        restored=RestoredCloud(np.concatenate([points, -points]), np.arange(2 * len(points)) < len(points)),
+        images=ImagePair(image, 255 - image),
+        keypoints_level=points[:3].copy(),
+        rung="full",
+        preset=work.options.preset,
+        image_method=work.options.image_method if paper else None,
+        bundle=DIGEST,
+        stage_ms=stage_ms,
+    )
+
+
+def cluster(count=40, seed=0):
+    """A patch 20 m by 4 m, 40 m ahead: float32 (count, 3)."""
+    unit = np.random.default_rng(seed).random((count, 3))
+    return (unit * [2, 20, 4] + [40, -10, -2]).astype(np.float32)
+
+
+def rows(points):
+    return points.astype(float).tolist()
+
+
+@dataclass
+class Doors:
+    """A running service with clients of both its doors."""
+
+    service: Service
+    pipeline: FakePipeline
+    rest: httpx.Client
+    stub: ShipshapeStub
+    channel: grpc.Channel
+    addresses: object
+
+    def ask_rest(self, points, path="/v1/recognise", headers=None, **fields):
+        return self.rest.post(path, json={"points": rows(points), **fields}, headers=headers)
+
+    def ask_grpc(self, points, options=None, timeout=PATIENCE, **fields):
+        return self.stub.Recognise.with_call(request(points, options, **fields), timeout=timeout)
+
+
+def request(points, options=None, **fields):
+    packed = points if isinstance(points, bytes) else points.astype("<f4").tobytes()
+    return pb.RecogniseRequest(contact=pb.Contact(points=packed, **fields), options=options)
+
+
+def image_methods():
+    return list(ImageMethod)
+
+
+@contextmanager
+def running(*, opened=True, **settings):
+    """A service around a fresh fake pipeline on free ports."""
+    pipeline = FakePipeline()
+    settings = {
+        "rest_port": 0,
+        "grpc_port": 0,
+        "workers": 1,
+        "drain_s": PATIENCE,
+        "default_timeout_ms": PATIENCE * 1e3,
+        **settings,
+    }
+    service = Service(
+        Settings(**settings),
+        lambda contact, recognition: PNG,
+        on_death=lambda: pytest.fail("a door died"),
+    )
+    addresses = service.start()
+    if opened:
+        service.open(Model(FakeBundle(), pipeline))
+    channel = grpc.insecure_channel(f"127.0.0.1:{addresses.grpc_port}")
+    rest = httpx.Client(base_url=f"http://127.0.0.1:{addresses.rest_port}", timeout=PATIENCE, trust_env=False)
+    with channel, rest:
+        yield Doors(service, pipeline, rest, ShipshapeStub(channel), channel, addresses)
+        pipeline.release.set()
+        rest.close()
+        channel.close()
+        service.stop()
+
+
+@pytest.fixture(scope="module")
+def doors():
+    """One service for all tests of a module that leave it as they found it."""
+    with running() as doors:
+        yield doors
