@@ -1,6 +1,7 @@
 """A contact and its recognition without any model: a box hull of which the sensor saw one side."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -35,6 +36,13 @@ def side_of_hull(heading: float, origin: tuple[float, float, float], count: int 
     rng = np.random.default_rng(1)
     points = rng.uniform((-6, -2, 0), (6, -1.8, 3), (count, 3)).astype(np.float32)
     return frames.to_level(points, heading, origin)
+
+
+def write_scan(path: Path) -> Path:
+    """Three clusters of which the second has too few points."""
+    good = side_of_hull(0.5, (40.0, 5.0, -3.0))
+    np.savez(path, points=np.concatenate([good, good[:3], good]), n=np.array([80, 3, 80]))
+    return path
 
 
 def recognised(

@@ -1,0 +1,138 @@
+"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR.
+
+Exit codes: 0 all went well; 1 a cluster or file was refused, or the service failed; 2 the command, a setting
+or the bundle is wrong.
+"""
+
+import argparse
+import importlib.metadata
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from shipshape.errors import ShipshapeError
+from shipshape.types import ImageMethod, Preset
+
+OK, UNUSABLE, INTERRUPTED = 0, 2, 130
+
+_CLASSIFY_NOTES = """\
+example:
+  shipshape classify scan.npz --sensor-height 3.2 --json | jq .vessel
+
+files (metres, level frame: origin at the LiDAR, x ahead, y to port, z up):
+  .npy (N, 3)   .npz `points` (sum N, 3) and `n`, points a cluster   .csv .xyz   .pcd   .ply
+
+--json prints one object a cluster and line:
+  file, index           where the cluster came from
+  vessel, probability, probabilities, unknown
+  heading, heading_std  radians, counter-clockwise from ahead; bow_probability that it is not the opposite
+  aspect_deg            0 bow-on, 90 abeam, 180 stern-on
+  box                   center (level frame), length, beam, height; metres
+  measured_points, inferred_points, rung, bundle, stage_ms
+  true_heading_deg      only with --own-heading; clockwise from north
+  or file, index (null: the whole file) and error for what is refused
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    arguments = build_parser().parse_args(argv)
+    # Only now: the numerical libraries take a second to load, and `--help` must not wait for them.
+    from shipshape.commands import COMMANDS  # noqa: PLC0415
+
+    try:
+        code = COMMANDS[arguments.command](arguments)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # The reader has seen enough (`| head`); Python must find nothing to flush at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except ShipshapeError as error:
+        print(f"shipshape: {error}", file=sys.stderr)
+        return UNUSABLE
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of all commands; `arguments.command` names the one chosen."""
+    parser = argparse.ArgumentParser(
+        prog="shipshape",
+        description="Recognises and restores vessels from sparse LiDAR clusters.",
+    )
+    parser.add_argument("--version", action="version", version=importlib.metadata.version("shipshape"))
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_serve(commands)
+    _add_classify(commands)
+    _add_check(commands)
+    _add_bundle(commands)
+    return parser
+
+
+_Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+
+def _add(commands: _Commands, name: str, summary: str, notes: str) -> argparse.ArgumentParser:
+    return commands.add_parser(
+        name,
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=notes,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def _add_serve(commands: _Commands) -> None:
+    notes = "example:\n  shipshape serve --rest-port 8080 --grpc-port 50051\n\n" + (
+        "Each option, and every limit, is also a variable: SHIPSHAPE_REST_PORT=8080 shipshape serve"
+    )
+    parser = _add(commands, "serve", "open the gRPC and REST doors until SIGTERM", notes)
+    parser.set_defaults(command="serve")
+    parser.add_argument("--host", help="address to listen on (default: loopback)")
+    parser.add_argument("--rest-port", type=int, help="0 picks a free one")
+    parser.add_argument("--grpc-port", type=int, help="0 picks a free one")
+    parser.add_argument("--workers", type=int, help="threads that compute; 0 is one a core")
+    _add_bundle_option(parser)
+
+
+def _add_classify(commands: _Commands) -> None:
+    parser = _add(commands, "classify", "recognise the clusters in files", _CLASSIFY_NOTES)
+    parser.set_defaults(command="classify")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    parser.add_argument("--json", action="store_true", help="one JSON object a cluster and line")
+    parser.add_argument("--png", type=Path, metavar="DIR", help="draw a picture of each cluster into DIR")
+    parser.add_argument("--preset", type=Preset, choices=list(Preset), default=Preset.BEST)
+    parser.add_argument(
+        "--image-method", type=ImageMethod, choices=list(ImageMethod), help="with --preset paper alone"
+    )
+    parser.add_argument("--sensor-height", type=float, metavar="M", help="LiDAR above the water, metres")
+    parser.add_argument(
+        "--own-heading", type=float, metavar="DEG", help="own true heading, degrees clockwise from north"
+    )
+    _add_bundle_option(parser)
+
+
+def _add_check(commands: _Commands) -> None:
+    notes = "example:\n  shipshape check --bundle models"
+    summary = "dry run: verify the bundle and time every stage, no port opened"
+    parser = _add(commands, "check", summary, notes)
+    parser.set_defaults(command="check")
+    _add_bundle_option(parser)
+
+
+def _add_bundle(commands: _Commands) -> None:
+    bundle = _add(commands, "bundle", "work on model bundles", "example:\n  shipshape bundle verify models")
+    actions = bundle.add_subparsers(metavar="ACTION", required=True)
+    summary = "compare every file of a bundle with its manifest"
+    verify = _add(actions, "verify", summary, "example:\n  shipshape bundle verify models")
+    verify.set_defaults(command="bundle verify")
+    verify.add_argument("folder", type=Path, metavar="DIR")
+
+
+def _add_bundle_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--bundle", type=Path, metavar="DIR", help="model bundle (default: SHIPSHAPE_BUNDLE or models)"
+    )

@@ -1,0 +1,167 @@
+"""What the commands do, once their arguments are parsed; each returns its exit code."""
+
+import argparse
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+
+import cv2
+import orjson
+
+from shipshape.bundle import Bundle, load_bundle
+from shipshape.classify import Answered, Outcome, PictureFolder, Refused, Situation, classify_files, to_record
+from shipshape.errors import FileError
+from shipshape.pipeline import Pipeline
+from shipshape.render import render_png
+from shipshape.sample import sample_contact
+from shipshape.serving.life import serve as serve_until_signal
+from shipshape.settings import SettingsError, load_settings
+from shipshape.tables import answer_line, columns, refusal_line, title_line
+from shipshape.types import ImageMethod, Options, Preset
+
+OK, REFUSED = 0, 1
+CHECK_RUNS = 20
+PROGRESS_STEP_S = 0.1
+
+
+def serve(arguments: argparse.Namespace) -> int:
+    """Open the doors until a signal."""
+    names = ("host", "rest_port", "grpc_port", "workers", "bundle")
+    given = {name: value for name in names if (value := getattr(arguments, name)) is not None}
+    return serve_until_signal(load_settings(**given))
+
+
+def classify(arguments: argparse.Namespace) -> int:
+    """Recognise the clusters in files; 1 when any was refused."""
+    options = _options(arguments)
+    bundle, pipeline = _open(arguments.bundle)
+    _warm_up(pipeline, options)
+    situation = Situation(arguments.sensor_height, arguments.own_heading)
+    outcomes = classify_files(arguments.files, lambda contact: pipeline.run(contact, options), situation)
+    if arguments.png is not None:
+        outcomes = _drawn(outcomes, arguments.png)
+    if sys.stderr.isatty() and not sys.stdout.isatty():
+        outcomes = _with_progress(outcomes)
+    lines = _json_lines(outcomes) if arguments.json else _table_lines(outcomes, bundle, arguments.files)
+    refused = False
+    for outcome, line in lines:
+        print(line, flush=True)
+        refused = refused or isinstance(outcome, Refused)
+    return REFUSED if refused else OK
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Verify the bundle, warm up, recognise the built-in cluster and print what each stage took."""
+    bundle, pipeline = _open(arguments.bundle)
+    _print_bundle(bundle)
+    started = time.perf_counter()
+    for preset in Preset:
+        _warm_up(pipeline, Options(preset))
+    print(f"warm after {(time.perf_counter() - started) * 1e3:.0f} ms\n")
+    contact = sample_contact()
+    runs = [pipeline.run(contact, Options()) for _ in range(CHECK_RUNS)]
+    layout = columns([contact.contact_id], [vessel.name for vessel in bundle.catalogue])
+    print(title_line(layout), answer_line(layout, contact.contact_id, runs[-1]), sep="\n", end="\n\n")
+    _print_stages([run.stage_ms for run in runs], len(contact.points_level))
+    return OK
+
+
+def verify(arguments: argparse.Namespace) -> int:
+    """Compare every file of a bundle with its manifest, and what the stages read with what is there."""
+    bundle = load_bundle(arguments.folder)
+    _print_bundle(bundle)
+    Pipeline(bundle)
+    for name, model in bundle.models.items():
+        inputs, outputs = (", ".join(map(str, side)) for side in (model.signature.inputs, model.signature.outputs))
+        print(f"  {name}: {inputs} -> {outputs}")
+    print("every file is as the manifest says")
+    return OK
+
+
+COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
+    "serve": serve,
+    "classify": classify,
+    "check": check,
+    "bundle verify": verify,
+}
+
+
+def _options(arguments: argparse.Namespace) -> Options:
+    method: ImageMethod | None = arguments.image_method
+    if method is None:
+        return Options(arguments.preset)
+    if arguments.preset is not Preset.PAPER:
+        raise SettingsError(f"expected --image-method with --preset paper alone, got --preset {arguments.preset}")
+    return Options(arguments.preset, method)
+
+
+def _open(folder: Path | None) -> tuple[Bundle, Pipeline]:
+    cv2.setNumThreads(1)  # as in the service: a contact is one core's work
+    bundle = load_bundle(folder or load_settings().bundle)
+    return bundle, Pipeline(bundle)
+
+
+def _warm_up(pipeline: Pipeline, options: Options) -> None:
+    """The first run compiles and fills caches; its time says nothing about the next."""
+    pipeline.run(sample_contact(), options)
+
+
+Lines = Iterator[tuple[Outcome | None, str]]
+
+
+def _json_lines(outcomes: Iterable[Outcome]) -> Lines:
+    for outcome in outcomes:
+        yield outcome, orjson.dumps(to_record(outcome)).decode()
+
+
+def _table_lines(outcomes: Iterable[Outcome], bundle: Bundle, files: list[Path]) -> Lines:
+    names = [f"{file} 0000" if file.suffix == ".npz" else str(file) for file in files]
+    layout = columns(names, [vessel.name for vessel in bundle.catalogue])
+    yield None, title_line(layout)
+    for outcome in outcomes:
+        many = outcome.index is not None and outcome.total > 1
+        name = f"{outcome.file} {outcome.index}" if many else f"{outcome.file}"
+        if isinstance(outcome, Answered):
+            yield outcome, answer_line(layout, name, outcome.recognition)
+        else:
+            yield outcome, refusal_line(layout, name, outcome.error)
+
+
+def _drawn(outcomes: Iterable[Outcome], folder: Path) -> Iterator[Outcome]:
+    pictures = PictureFolder(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for outcome in outcomes:
+            if isinstance(outcome, Answered):
+                pictures.path(outcome).write_bytes(render_png(outcome.contact, outcome.recognition))
+            yield outcome
+    except OSError as error:
+        raise FileError(f"expected to write pictures into {folder}, got: {error.strerror}") from error
+
+
+def _with_progress(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+    """One line on the terminal that counts along while the answers go elsewhere."""
+    shown = 0.0
+    for outcome in outcomes:
+        if outcome.index is not None and time.monotonic() - shown > PROGRESS_STEP_S:
+            shown = time.monotonic()
+            filled = 30 * (outcome.index + 1) // outcome.total
+            bar = f"{'█' * filled}{'░' * (30 - filled)} {outcome.index + 1}/{outcome.total}"
+            print(f"\r\x1b[K{bar} {outcome.file.name}", end="", file=sys.stderr, flush=True)
+        yield outcome
+    print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _print_bundle(bundle: Bundle) -> None:
+    vessels = ", ".join(vessel.name for vessel in bundle.catalogue)
+    print(f"bundle {bundle.name} ({bundle.digest[:12]}): {vessels}; {len(bundle.models)} models")
+
+
+def _print_stages(runs: list[Mapping[str, float]], points: int) -> None:
+    medians = {name: statistics.median(run[name] for run in runs) for name in runs[0]}
+    for name, ms in medians.items():
+        print(f"{name:16}{ms:8.2f} ms")
+    total = statistics.median(sum(run.values()) for run in runs)
+    print(f"{'total':16}{total:8.2f} ms, median of {len(runs)} runs on {points} points")
