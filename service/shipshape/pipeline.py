@@ -37,7 +37,7 @@ class Pipeline:
     def __init__(self, bundle: Bundle, limits: ContactLimits | None = None) -> None:
         self.bundle = bundle
         self.limits = limits or ContactLimits()
-        self._methods = {Preset.PAPER: PaperMethod(bundle), Preset.BEST: BestMethod(bundle)}
+        self._methods: dict[Preset, PaperMethod | BestMethod] = {Preset.PAPER: PaperMethod(bundle), Preset.BEST: BestMethod(bundle)}
         self._names = [vessel.name for vessel in bundle.catalogue]
         self._common = bundle.parameters["common"]
         self.stages = (

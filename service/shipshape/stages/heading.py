@@ -32,7 +32,7 @@ def by_area_projection(points_level: Float32[np.ndarray, "n 3"], box: ReferenceB
     Returns:
         Heading modulo pi, radians in (-pi/2, pi/2]; 300 candidates 0.6 degrees apart.
     """
-    hull = cv2.convexHull(points_level[:, :2])[:, 0]
+    hull = cv2.convexHull(np.ascontiguousarray(points_level[:, :2]))[:, 0]
     along = np.ptp(hull @ _AXES, axis=0)
     across = np.ptp(hull @ np.stack([-_AXES[1], _AXES[0]]), axis=0)
     overlap = np.minimum(along, box.length) * np.minimum(across, box.beam)

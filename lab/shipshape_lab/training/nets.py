@@ -1,0 +1,174 @@
+"""The networks, small enough for one CPU core: what goes in and out is what the stages of the service expect."""
+
+import torch
+from torch import Tensor, nn
+
+
+def _conv(channels_in: int, channels_out: int, stride: int = 1) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Conv2d(channels_in, channels_out, 3, stride, 1, bias=False),
+        nn.BatchNorm2d(channels_out),
+        nn.ReLU(inplace=True),
+    )
+
+
+class _Encoder(nn.Module):
+    """Strided convolutions, each followed by one at the same size; image and features to one vector."""
+
+    def __init__(self, planes: int, shape: tuple[int, int], features: int, width: int = 24) -> None:
+        super().__init__()
+        self.image = nn.Sequential(
+            _conv(planes, width, 2),
+            _conv(width, width),
+            _conv(width, 2 * width, 2),
+            _conv(2 * width, 2 * width),
+            _conv(2 * width, 4 * width, 2),
+            _conv(4 * width, 4 * width),
+            _conv(4 * width, 4 * width, 2),
+        )
+        cells = (shape[0] // 16) * (shape[1] // 16)
+        self.mix = nn.Sequential(
+            nn.Linear(4 * width * cells + features, 192), nn.ReLU(inplace=True), nn.Dropout(0.1)
+        )
+
+    def forward(self, planes: Tensor, features: Tensor) -> Tensor:
+        return self.mix(torch.cat([self.image(planes).flatten(1), features], dim=1))
+
+
+class SightNet(nn.Module):
+    """The cluster along the line of sight -> (sin 2a, cos 2a), shift of the middle, log size."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.encode = _Encoder(3, (64, 64), 4)
+        self.axis, self.shift, self.size = nn.Linear(192, 2), nn.Linear(192, 2), nn.Linear(192, 3)
+
+    def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
+        seen = self.encode(planes, features)
+        return self.axis(seen), self.shift(seen), self.size(seen) + 2.0
+
+
+class AlignedNet(nn.Module):
+    """The roughly aligned cluster -> turn and log of its spread, flip logit, shift, log size, class logits."""
+
+    def __init__(self, classes: int) -> None:
+        super().__init__()
+        self.encode = _Encoder(9, (32, 64), 3)
+        self.turn, self.flip = nn.Linear(192, 2), nn.Linear(192, 1)
+        self.shift, self.size, self.classes = nn.Linear(192, 3), nn.Linear(192, 3), nn.Linear(192, classes)
+
+    def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
+        seen = self.encode(planes, features)
+        turn = self.turn(seen)
+        turn = torch.cat([0.6 * torch.tanh(turn[:, :1]), turn[:, 1:].clamp(-7.0, 1.0)], dim=1)
+        return turn, self.flip(seen), self.shift(seen), self.size(seen), self.classes(seen)
+
+
+class UNet(nn.Module):
+    """Four levels; the bottleneck is handed out beside the full-size features."""
+
+    def __init__(self, planes: int, width: int) -> None:
+        super().__init__()
+        w = width
+        self.down = nn.ModuleList(
+            [
+                nn.Sequential(_conv(planes, w), _conv(w, w)),
+                nn.Sequential(_conv(w, 2 * w, 2), _conv(2 * w, 2 * w)),
+                nn.Sequential(_conv(2 * w, 4 * w, 2), _conv(4 * w, 4 * w)),
+                nn.Sequential(_conv(4 * w, 8 * w, 2), _conv(8 * w, 8 * w)),
+            ]
+        )
+        self.rise = nn.ModuleList([nn.Conv2d(8 * w, 4 * w, 1), nn.Conv2d(4 * w, 2 * w, 1), nn.Conv2d(2 * w, w, 1)])
+        self.up = nn.ModuleList(
+            [
+                nn.Sequential(_conv(8 * w, 4 * w), _conv(4 * w, 4 * w)),
+                nn.Sequential(_conv(4 * w, 2 * w), _conv(2 * w, 2 * w)),
+                nn.Sequential(_conv(2 * w, w), _conv(w, w)),
+            ]
+        )
+
+    def encode(self, image: Tensor) -> list[Tensor]:
+        """Features of each level, full size first."""
+        levels = []
+        for block in self.down:
+            image = block(image)
+            levels.append(image)
+        return levels
+
+    def decode(self, levels: list[Tensor], bottleneck: Tensor) -> Tensor:
+        """Full-size features from the bottleneck and the skipped levels."""
+        image = bottleneck
+        for rise, up, skipped in zip(self.rise, self.up, reversed(levels[:-1]), strict=True):
+            lifted = nn.functional.interpolate(rise(image), scale_factor=2.0, mode="nearest")
+            image = up(torch.cat([lifted, skipped], dim=1))
+        return image
+
+
+class InpaintingNet(nn.Module):
+    """Aligned planes and their mirror -> occupancy, top, bottom, sub-cell offset of each layer; class logits.
+
+    Heights are bounded by their layer (`edges`, shares of the depth range), bottoms by their top.
+    """
+
+    def __init__(self, classes: int, edges: tuple[float, ...], width: int = 16) -> None:
+        super().__init__()
+        self.unet = UNet(18, width)
+        self.inject = nn.Linear(3, 8 * width)
+        self.head = nn.Conv2d(width, 15, 1)
+        self.classify = nn.Sequential(
+            nn.Conv2d(8 * width, 32, 1), nn.ReLU(), nn.Flatten(), nn.Dropout(0.2), nn.Linear(32 * 4 * 8, classes)
+        )
+        lower = torch.tensor(edges[:-1], dtype=torch.float32).view(1, -1, 1, 1)
+        upper = torch.tensor(edges[1:], dtype=torch.float32).view(1, -1, 1, 1)
+        self.register_buffer("lower", lower)
+        self.register_buffer("thickness", upper - lower)
+
+    def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
+        levels = self.unet.encode(planes)
+        bottleneck = levels[-1] + self.inject(features)[:, :, None, None]
+        out = self.head(self.unet.decode(levels, bottleneck))
+        top = torch.sigmoid(out[:, 3:6])
+        bottom = top * torch.sigmoid(out[:, 6:9])
+        return (
+            torch.sigmoid(out[:, 0:3]),
+            self.lower + self.thickness * top,
+            self.lower + self.thickness * bottom,
+            0.5 * torch.tanh(out[:, 9:15]).unflatten(1, (2, 3)),
+            self.classify(bottleneck),
+        )
+
+
+class GreyNet(nn.Module):
+    """The paper's inpainting: grey image in [0, 1], three layers as channels -> the same, completed."""
+
+    def __init__(self, width: int = 12) -> None:
+        super().__init__()
+        self.unet = UNet(3, width)
+        self.head = nn.Conv2d(width, 3, 1)
+
+    def forward(self, image: Tensor) -> Tensor:
+        levels = self.unet.encode(image)
+        return torch.sigmoid(self.head(self.unet.decode(levels, levels[-1])))
+
+
+class Spd2Net(nn.Module):
+    """The "standard CNN": SPD2 image (5, 16, 32) -> class logits."""
+
+    def __init__(self, classes: int) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(
+            _conv(5, 24),
+            nn.MaxPool2d(2),
+            _conv(24, 48),
+            nn.MaxPool2d(2),
+            _conv(48, 64),
+            nn.MaxPool2d(2),
+            nn.Flatten(),
+            nn.Dropout(0.3),
+            nn.Linear(64 * 2 * 4, 96),
+            nn.ReLU(),
+            nn.Linear(96, classes),
+        )
+
+    def forward(self, images: Tensor) -> Tensor:
+        return self.layers(images)

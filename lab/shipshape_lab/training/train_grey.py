@@ -1,0 +1,77 @@
+"""Train the paper's inpainting for one image method: grey image of the cluster to that of the whole vessel.
+
+python -m shipshape_lab.training.train_grey --method full_side --data runs/data --out runs/default
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+import torch
+from shipshape import raster
+from shipshape.stages import heading, projection
+from shipshape.types import ImageMethod, Pose, ReferenceBox
+from torch import Tensor, nn
+
+from shipshape_lab.simulator.vessels import CATALOGUE
+from shipshape_lab.training import arguments, export, loop
+from shipshape_lab.training.catalogue import reference_boxes
+from shipshape_lab.training.examples import Example, Examples
+from shipshape_lab.training.nets import GreyNet
+
+EPOCHS = 5
+
+
+def paper_pose(example: Example, boxes: list[ReferenceBox]) -> Pose:
+    """The pose that the paper's search finds when the class and the bow are right."""
+    points, box = example.contact.points_level, boxes[example.label]
+    axis = heading.by_area_projection(points, box)
+    if np.cos(axis - example.pose.heading) < 0:
+        axis += np.pi
+    height = example.contact.sensor_height
+    return heading.anchor_box(points, axis, box, points[:, 2].min() if height is None else -height)
+
+
+def to_item(example: Example, method: ImageMethod, boxes: list[ReferenceBox]) -> dict:
+    """Grey images in [0, 1] of the cluster and of the complete surface, in the paper's pose."""
+    pose = paper_pose(example, boxes)
+    frame = projection.paper_frame(method, pose.size, max(box.length for box in boxes))
+    images = {}
+    for name, points in (("image", example.contact.points_level), ("whole", example.surface_level)):
+        layers = projection.project(points, pose, frame)
+        grey = raster.to_grey(layers.count > 0, layers.top, frame)
+        images[name] = grey.transpose(2, 0, 1).astype(np.float32) / 255
+    return images
+
+
+def loss_of(net: nn.Module, batch: dict[str, Tensor]) -> Tensor:
+    """Absolute error, half of it over the filled pixels, so that the many empty ones do not drown them."""
+    error = (net(batch["image"]).float() - batch["whole"]).abs()
+    filled = (batch["whole"] > 0).float()
+    return error.mean() + (error * filled).sum() / (filled.sum() + 1.0)
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Train, or go on training, and export inpainting_METHOD.onnx."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--method", type=ImageMethod, choices=list(ImageMethod), required=True)
+    chosen, rest = parser.parse_known_args(argv)
+    args = arguments.parse(__doc__, rest, epochs=EPOCHS)
+    examples, boxes = Examples.read(args.data, "train", catalogue_only=True), reference_boxes(CATALOGUE)
+    data = loop.Drawn(
+        examples.indices, lambda i, rng: to_item(examples.drawn(i, rng), chosen.method, boxes), args.seed
+    )
+    torch.manual_seed(args.seed)
+    schedule = loop.Schedule(args.epochs, seed=args.seed)
+    name = f"inpainting_{chosen.method}"
+    net = loop.train(GreyNet(), data, loss_of, schedule, args.out / f"checkpoints/{name}.pt")
+    write(net, args.out / "bundle", name)
+
+
+def write(net: nn.Module, folder: Path, name: str) -> None:
+    """Export to NAME.onnx."""
+    export.export(net, {"image": torch.rand(1, 3, 64, 64)}, ["filled"], folder / f"{name}.onnx")
+
+
+if __name__ == "__main__":
+    main()
