@@ -131,6 +131,7 @@ class Doors:
     stub: ShipshapeStub
     channel: grpc.Channel
     addresses: object
+    kept: list = field(default_factory=list)
 
     def ask_rest(self, points, path="/v1/recognise", headers=None, **fields):
         return self.rest.post(path, json={"points": rows(points), **fields}, headers=headers)

@@ -1,0 +1,61 @@
+import json
+import logging
+import sys
+
+import pytest
+from prometheus_client import CollectorRegistry
+
+from shipshape.telemetry import JsonLines, Metrics, new_request_id, request_id
+
+
+def record(message, exc_info=None):
+    return logging.LogRecord("shipshape.x", logging.ERROR, __file__, 1, message, (), exc_info)
+
+
+def test_a_log_line_is_one_object():
+    new_request_id("voyage-7")
+    try:
+        raise ValueError("two\nlines")
+    except ValueError:
+        text = JsonLines().format(record("it ünder\nbroke", sys.exc_info()))
+    assert "\n" not in text
+    line = json.loads(text)
+    assert (line["level"], line["message"], line["request_id"]) == ("error", "it ünder\nbroke", "voyage-7")
+    assert "ValueError" in line["traceback"]
+    assert line["time"].endswith("Z")
+
+
+def test_no_request_no_id():
+    request_id.set("")
+    assert "request_id" not in json.loads(JsonLines().format(record("start")))
+
+
+@pytest.mark.parametrize("proposed", ["", "x" * 65, "a b", "a\nb", '"', "é"])
+def test_an_id_that_could_harm_a_log_is_replaced(proposed):
+    chosen = new_request_id(proposed)
+    assert chosen != proposed
+    assert len(chosen) == 16
+    assert request_id.get() == chosen
+
+
+def test_a_request_is_timed_though_it_fails():
+    metrics = Metrics(CollectorRegistry())
+
+    def fail():
+        with metrics.request("rest", "recognise") as outcome:
+            outcome.kind = "internal"
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    labels = {"door": "rest", "method": "recognise", "outcome": "internal"}
+    assert metrics.registry.get_sample_value("shipshape_request_seconds_count", labels) == 1
+    assert metrics.registry.get_sample_value("shipshape_in_flight", {"door": "rest"}) == 0
+
+
+def test_two_services_in_one_process_do_not_share_metrics():
+    first, second = Metrics(CollectorRegistry()), Metrics(CollectorRegistry())
+    first.observe_stage("prior", 0.01)
+    labels = {"stage": "prior"}
+    assert first.registry.get_sample_value("shipshape_stage_seconds_count", labels) == 1
+    assert second.registry.get_sample_value("shipshape_stage_seconds_count", labels) is None
