@@ -1,0 +1,88 @@
+# Shipshape's commands; `make` lists them. Needs Python 3.11 with pip and venv, and nothing else.
+PYTHON ?= $(or $(shell command -v python3.11 2>/dev/null),python3)
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# Builds this checkout in place with the locked tools: nothing is downloaded, and nothing but it is installed.
+EDITABLE := $(PIP) install --no-build-isolation --no-deps --no-index
+
+.DEFAULT_GOAL := help
+.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch lock hooks
+
+help: ## list these commands
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+demo: $(VENV)/.service ## start the service, send it a scan as a client would, print a table and write pictures
+	@$(BIN)/python examples/demo.py
+
+serve: $(VENV)/.service ## run the service on loopback until Ctrl-C
+	@$(BIN)/shipshape serve
+
+setup: $(VENV)/.dev ## create .venv with everything but torch
+
+test: $(VENV)/.dev ## run the whole suite
+	@$(BIN)/python -m pytest -n 2
+
+check: lint types arch gen-check test ## everything a change must pass
+
+fmt: $(VENV)/.dev ## format, and fix what can be fixed
+	@$(BIN)/ruff check --fix-only --quiet
+	@$(BIN)/ruff format
+
+lint: $(VENV)/.dev ## style and format
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+
+types: $(VENV)/.dev ## mypy --strict on the service
+	@$(BIN)/mypy
+
+arch: $(VENV)/.dev ## who may import whom
+	@$(BIN)/lint-imports
+
+gen: $(VENV)/.dev ## write the gRPC stubs again from proto/
+	@PYTHON=$(BIN)/python sh proto/generate.sh
+
+gen-check: $(VENV)/.dev ## the gRPC stubs are those of proto/
+	@fresh=$$(mktemp -d) && trap 'rm -rf "$$fresh"' EXIT && PYTHON=$(BIN)/python sh proto/generate.sh "$$fresh" && \
+	for stub in "$$fresh"/shipshape/v1/*; do \
+	  diff "$$stub" "service/shipshape/v1/$${stub##*/}" || { echo "make gen-check: expected the stubs of proto/, got others: run make gen" >&2; exit 1; }; \
+	done
+
+train: torch ## make the default bundle in the lab: data sets, networks, ONNX, manifest
+	@$(BIN)/python -m shipshape_lab.training
+
+torch: $(VENV)/.dev ## add torch, which only the lab and its tests use
+	@$(BIN)/python -c 'import torch' 2>/dev/null || $(PIP) install --requirement requirements/torch.txt
+
+hooks: $(VENV)/.dev ## run the quick checks before each of your commits
+	@$(BIN)/pre-commit install
+
+LOCK = UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --universal --python-version 3.11 \
+  --generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links
+
+lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
+	@$(LOCK) pyproject.toml requirements/build.in --output-file requirements/service.lock
+	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in \
+	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
+
+# A stamp is older than its lock only when the lock changed: the second time, nothing is asked of the network.
+$(VENV)/.service: requirements/service.lock pyproject.toml | $(BIN)/python
+	@echo "installing what requirements/service.lock pins"
+	@$(PIP) install --require-hashes --requirement requirements/service.lock
+	@$(EDITABLE) --editable .
+	@touch $@
+
+$(VENV)/.dev: requirements/dev.lock lab/pyproject.toml $(VENV)/.service
+	@echo "installing what requirements/dev.lock pins"
+	@$(PIP) install --require-hashes --requirement requirements/dev.lock
+	@$(EDITABLE) --editable lab
+	@touch $@
+
+$(BIN)/python:
+	@$(PYTHON) -c '' 2>/dev/null || \
+	  { echo "make: expected Python 3.11 as python3.11, python3 or PYTHON=..., found none that starts" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "make: expected Python 3.11 or newer, got $$($(PYTHON) --version): name one with PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+	  { echo "make: expected Python's venv and pip modules, found none: on Debian, apt install python3-venv" >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
