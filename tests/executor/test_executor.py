@@ -155,6 +155,13 @@ def test_cancelled_in_the_queue_frees_its_place(executor, gate):
     assert left.work.seen == []
 
 
+def test_a_cancelled_future_counts_as_cancelled(executor, gate):
+    ticket = executor.submit(task(Note("a")))
+    assert ticket.future.cancel()
+    assert executor.queue_depth == 0
+    assert executor.counts().cancelled == 1
+
+
 def test_cancelled_while_running_stops_at_the_boundary_and_keeps_its_worker_until_then(executor):
     gate = Gate()
     left = task(gate, Note("after"))

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -15,23 +16,33 @@ import pytest
 from serving.fakes import PATIENCE, cluster, request, rows
 from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
 
-MODELS = Path(__file__).parents[2] / "models"
+TESTS = Path(__file__).parents[1]
+MODELS = TESTS.parent / "models"
 SERVE = """
 import sys
-from shipshape.serving.life import serve
+from shipshape.serving import life
 from shipshape.settings import load_settings
-sys.exit(serve(load_settings()))
+{before}
+sys.exit(life.serve(load_settings()))
 """
+WITH_FAKES = """
+from serving.fakes import PNG, FakeBundle, FakePipeline
+life.load_bundle = lambda path: FakeBundle()
+life.Pipeline = lambda bundle, limits: FakePipeline()
+life.render_png = lambda contact, recognition: PNG
+"""
+BROKEN = WITH_FAKES + "life.Pipeline = lambda bundle, limits: None"
 START_PATIENCE = 60.0
 needs_models = pytest.mark.skipif(
     not (MODELS / "manifest.toml").is_file(), reason="models/ has no manifest.toml yet"
 )
 
 
-def start(**variables):
+def start(before="", **variables):
     environment = {name: value for name, value in os.environ.items() if not name.startswith("SHIPSHAPE_")}
-    environment |= {"SHIPSHAPE_REST_PORT": "0", "SHIPSHAPE_GRPC_PORT": "0", **variables}
-    return subprocess.Popen([sys.executable, "-c", SERVE], env=environment, stderr=subprocess.PIPE, text=True)
+    environment |= {"SHIPSHAPE_REST_PORT": "0", "SHIPSHAPE_GRPC_PORT": "0", "PYTHONPATH": str(TESTS), **variables}
+    script = [sys.executable, "-c", SERVE.format(before=before)]
+    return subprocess.Popen(script, env=environment, stderr=subprocess.PIPE, text=True)
 
 
 def until_ready(process):
@@ -43,10 +54,10 @@ def until_ready(process):
     pytest.fail(f"it ended with {process.wait(PATIENCE)} before it was ready")
 
 
-@needs_models
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_process_serves_and_stops_when_told_to(number):
-    with start(SHIPSHAPE_BUNDLE=str(MODELS)) as process:
+@pytest.mark.parametrize("before", [WITH_FAKES, pytest.param("", marks=needs_models)], ids=["fakes", "models"])
+def test_a_process_serves_and_stops_when_told_to(before, number):
+    with start(before, SHIPSHAPE_BUNDLE=str(MODELS)) as process:
         try:
             rest_port, grpc_port = until_ready(process)
             points = cluster(400)
@@ -67,3 +78,18 @@ def test_a_missing_bundle_stops_the_start_with_one_sentence(tmp_path):
     with start(SHIPSHAPE_BUNDLE=str(tmp_path / "nowhere")) as process:
         assert process.wait(START_PATIENCE) == 1
         assert re.fullmatch(r"shipshape: expected .+nowhere.*, got .+\n", process.stderr.read())
+
+
+def test_a_taken_port_stops_the_start_with_one_sentence():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with start(WITH_FAKES, SHIPSHAPE_GRPC_PORT=str(port)) as process:
+            assert process.wait(START_PATIENCE) == 1
+            last = process.stderr.read().splitlines()[-1]
+            assert last.startswith(f"shipshape: expected to listen on 127.0.0.1:{port}")
+
+
+def test_a_bundle_that_fails_its_warm_up_stops_the_start():
+    with start(BROKEN) as process:
+        assert process.wait(START_PATIENCE) == 1
+        assert "shipshape: expected bundle fake to answer the built-in contact, got " in process.stderr.read()

@@ -37,18 +37,21 @@ def serve(settings: Settings) -> int:
         service = Service(settings, render_png, on_death=lambda: ends.put(DIED))
         addresses = service.start()
     except (BundleError, OSError) as error:
-        sys.stderr.write(f"shipshape: {error}\n")
-        return 1
+        return _failed(str(error))
     _logger.info("live on REST port %d, gRPC port %d", addresses.rest_port, addresses.grpc_port)
     try:
         service.open(model)
-        _logger.info(
-            "ready: REST http://%s:%d, gRPC %s:%d, bundle %s (%s)",
-            *(addresses.host, addresses.rest_port, addresses.host, addresses.grpc_port),
-            *(bundle.name, bundle.digest),
-        )
+        _logger.info("ready: %s, bundle %s (%s)", addresses, bundle.name, bundle.digest)
         ended_by = ends.get()
+    except Exception as error:
+        _logger.exception("the warm-up failed")
+        return _failed(f"expected bundle {bundle.name} to answer the built-in contact, got {error!r}")
     finally:
         service.stop()
     _logger.info("stopped")
     return 1 if ended_by == DIED else 0
+
+
+def _failed(sentence: str) -> int:
+    sys.stderr.write(f"shipshape: {sentence}\n")
+    return 1

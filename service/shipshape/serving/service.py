@@ -33,6 +33,9 @@ class Addresses:
     rest_port: int
     grpc_port: int
 
+    def __str__(self) -> str:
+        return f"REST http://{self.host}:{self.rest_port}, gRPC {self.host}:{self.grpc_port}"
+
 
 class Service:
     """A service that `start` makes live, `open` makes ready, and `stop` ends without dropping a request.
@@ -58,13 +61,14 @@ class Service:
         self._rest = RestDoor(build_app(self._core, self._metrics, timeouts), on_death=on_death)
 
     def start(self) -> Addresses:
-        """Listen and refuse; raises OSError when an address cannot be bound."""
+        """Listen and refuse; raises OSError, with nothing left open, when an address cannot be bound."""
         host = self._settings.host
-        return Addresses(
-            host,
-            rest_port=self._rest.start(host, self._settings.rest_port),
-            grpc_port=self._grpc.start(host, self._settings.grpc_port),
-        )
+        try:
+            rest_port = self._rest.start(host, self._settings.rest_port)
+            return Addresses(host, rest_port, grpc_port=self._grpc.start(host, self._settings.grpc_port))
+        except OSError:
+            self.stop()
+            raise
 
     def open(self, model: Model) -> None:
         """Warm `model` up, then take requests; raises whatever the warm-up raises."""

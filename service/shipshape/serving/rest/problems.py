@@ -7,7 +7,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
-from shipshape.serving.faults import Fault, FaultKind
+from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.telemetry import request_id
 
 STATUS = {
@@ -34,6 +34,7 @@ def add_handlers(app: FastAPI) -> None:
     """Give the framework's own refusals the same form."""
     app.add_exception_handler(HTTPException, _framework_refusal)
     app.add_exception_handler(RequestValidationError, _validation_refusal)
+    app.add_exception_handler(Exception, _unforeseen)
 
 
 def _framework_refusal(request: Request, error: Exception) -> Response:
@@ -55,6 +56,10 @@ def _validation_refusal(request: Request, error: Exception) -> Response:
     first = error.errors()[0]
     where = ".".join(map(str, first["loc"]))
     return problem(Fault(FaultKind.INVALID_INPUT, f"expected another value of {where}, got: {first['msg']}"))
+
+
+def _unforeseen(request: Request, error: Exception) -> Response:
+    return problem(fault_of(error))
 
 
 def _document(status: int, *, title: str, detail: str, error: FaultKind) -> Response:

@@ -33,7 +33,15 @@ class RestDoor:
         listener = _listener(host, port)
         bound: int = listener.getsockname()[1]
         # log_config: the service's own log format holds. access_log: the metrics and debug lines tell more.
-        config = uvicorn.Config(self._app, log_config=None, access_log=False, timeout_keep_alive=KEEP_ALIVE_S)
+        config = uvicorn.Config(
+            self._app,
+            log_config=None,
+            access_log=False,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            ws="none",
+            lifespan="off",
+            server_header=False,
+        )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(
             target=self._serve, args=(self._server, listener), name="rest", daemon=True
