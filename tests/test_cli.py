@@ -67,6 +67,35 @@ def test_json_is_one_object_a_cluster_and_line(scan, cluster, tmp_path, pipeline
     assert list(records[-1]) == ["file", "index", "error"]
 
 
+@pytest.mark.parametrize(
+    ("points", "sentence"),
+    [
+        (np.empty((0, 3)), "at least 10 points in a cluster, got 0"),
+        (np.full((50, 3), np.nan), "got 50 points with NaN or infinity"),
+        (np.full((50, 3), 1e300), "got 50 points with NaN or infinity"),
+        (np.ones((50, 2)), "floats of shape (N, 3), got float64 of shape (50, 2)"),
+        (np.ones((1_000_000, 3), np.float32), "at most 65536 points in a cluster, got 1000000"),
+        (np.linspace((100, 0, 0), (5100, 0, 0), 50), "got 5000.0 m"),
+    ],
+    ids=["empty", "nan", "beyond float32", "two columns", "a million", "five kilometres"],
+)
+def test_what_is_no_cluster_is_refused_in_one_sentence(points, sentence, tmp_path, pipeline, capsys):
+    np.save(tmp_path / "bad.npy", points)
+    assert main(["classify", "--json", str(tmp_path / "bad.npy")]) == 1
+    record = json.loads(capsys.readouterr().out)
+    assert record["error"].startswith("expected ")
+    assert sentence in record["error"]
+
+
+def test_progress_counts_on_the_terminal_while_the_answers_go_elsewhere(scan, pipeline, monkeypatch, capsys):
+    monkeypatch.setattr(commands, "PROGRESS_STEP_S", 0.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    main(["classify", str(scan), "--json"])
+    shown = capsys.readouterr()
+    assert "3/3 scan.npz" in shown.err
+    assert len(shown.out.splitlines()) == 3
+
+
 def test_one_picture_a_recognised_cluster(scan, tmp_path, pipeline, capsys):
     main(["classify", str(scan), "--png", str(tmp_path / "new" / "pictures")])
     pictures = sorted((tmp_path / "new" / "pictures").iterdir())

@@ -79,9 +79,7 @@ def test_npz_gives_back_the_clusters(tmp_path_factory, clusters):
 @given(
     cloud=clouds.filter(len),
     delimiter=st.sampled_from([",", ";", " ", "\t", ", "]),
-    names=st.sampled_from(
-        [[], ["x", "y", "z"], ["intensity", "z", "X", "y"], ['"Y[m]"', '"x[m]"', '"Z[m]"']]
-    ),
+    names=st.sampled_from([[], ["x", "y", "z"], ["intensity", "z", "X", "y"], ['"Y[m]"', '"x[m]"', '"Z[m]"']]),
 )
 def test_text_gives_back_the_points(tmp_path_factory, cloud, delimiter, names):
     axes = ["xyz".find(name.strip('"').lower()[0]) for name in names] or [0, 1, 2]  # -1: not a coordinate
@@ -238,6 +236,12 @@ def test_a_promise_of_a_trillion_points_takes_no_memory(tmp_path, name, make: Ca
     refusal(path, max_bytes=2**20)
 
 
+def test_text_has_a_lower_limit_since_it_grows_in_memory(tmp_path):
+    with (tmp_path / "cloud.csv").open("wb") as stream:
+        stream.truncate(65 * 2**20)
+    assert "expected at most 67108864 bytes of text in cloud.csv, got 68157440" in refusal(tmp_path / "cloud.csv")
+
+
 def test_a_file_over_the_limit_a_folder_and_a_missing_file_are_refused(tmp_path):
     np.save(tmp_path / "cloud.npy", POINTS)
     (tmp_path / "folder.npy").mkdir()
@@ -246,9 +250,7 @@ def test_a_file_over_the_limit_a_folder_and_a_missing_file_are_refused(tmp_path)
     assert "got: No such file" in refusal(tmp_path / "gone.npy")
 
 
-@pytest.mark.skipif(
-    not LIDAR.is_dir(), reason="the real scans beside the checkout (../shared/data) are absent"
-)
+@pytest.mark.skipif(not LIDAR.is_dir(), reason="the real scans beside the checkout (../shared/data) are absent")
 def test_every_real_file_is_read_or_refused_in_one_sentence():
     refused = {"ascii_empty.pcd", "ascii_invalid_header.pcd", "diamond.npz"}
     paths = [path for path in LIDAR.rglob("*") if path.suffix in SUFFIXES]
@@ -260,16 +262,13 @@ def test_every_real_file_is_read_or_refused_in_one_sentence():
             assert [cloud.shape[1] for cloud in read_clusters(path)] == [3], path
 
 
-@pytest.mark.skipif(
-    not LIDAR.is_dir(), reason="the real scans beside the checkout (../shared/data) are absent"
-)
+@pytest.mark.skipif(not LIDAR.is_dir(), reason="the real scans beside the checkout (../shared/data) are absent")
 def test_one_shape_written_by_other_tools_is_the_same_in_every_format():
     expected = np.genfromtxt(LIDAR / "pointcloudset" / "diamond.csv", delimiter=",", skip_header=1)[:, :3]
     for name in ["pointcloudset/diamond.xyz", "pyntcloud/diamond.npy", "pyntcloud/diamond_ascii.ply"]:
         np.testing.assert_allclose(read_clusters(LIDAR / name)[0], expected, err_msg=name)
     ascii_, binary, packed = (
-        read_clusters(LIDAR / "pypcd4" / f"{kind}.pcd")[0]
-        for kind in ["ascii", "binary", "binary_compressed"]
+        read_clusters(LIDAR / "pypcd4" / f"{kind}.pcd")[0] for kind in ["ascii", "binary", "binary_compressed"]
     )
     np.testing.assert_array_equal(binary, packed)
     np.testing.assert_allclose(ascii_, binary, rtol=1e-4)

@@ -50,9 +50,7 @@ def _read_array(stream: io.BufferedIOBase, size: int, what: str) -> np.ndarray:
         promised, present = math.prod(shape) * dtype.itemsize, size - stream.tell()
         if dtype.hasobject or promised != present:
             came = (
-                "pickled objects"
-                if dtype.hasobject
-                else f"a header for {promised} bytes with {present} behind it"
+                "pickled objects" if dtype.hasobject else f"a header for {promised} bytes with {present} behind it"
             )
             raise FileError(f"expected {what} to be a complete plain array, got {came}")
         stream.seek(0)
@@ -68,9 +66,7 @@ def _read_header(stream: io.BufferedIOBase) -> tuple[tuple[int, ...], np.dtype]:
     return shape, dtype
 
 
-def _split(
-    points: Float32[np.ndarray, "total 3"], n: np.ndarray, what: str
-) -> list[Float32[np.ndarray, "_ 3"]]:
+def _split(points: Float32[np.ndarray, "total 3"], n: np.ndarray, what: str) -> list[Float32[np.ndarray, "_ 3"]]:
     if n.ndim != 1 or n.dtype.kind not in "iu" or (n.size and n.min() < 0) or int(n.sum()) != len(points):
         raise FileError(
             f"expected n in {what} to be whole numbers that sum to the {len(points)} points, "

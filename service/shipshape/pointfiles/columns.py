@@ -24,9 +24,7 @@ def as_points(array: np.ndarray, what: str) -> Float32[np.ndarray, "n 3"]:
     if array.dtype.names:
         return xyz_from_records(array, what)
     if array.ndim != 2 or array.shape[1] != len(AXES) or array.dtype.kind != "f":
-        raise FileError(
-            f"expected {what} to be floats of shape (N, 3), got {array.dtype} of shape {array.shape}"
-        )
+        raise FileError(f"expected {what} to be floats of shape (N, 3), got {array.dtype} of shape {array.shape}")
     with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite, which the pipeline refuses
         return np.ascontiguousarray(array, dtype=np.float32)
 

@@ -21,9 +21,7 @@ def read_pcd(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
     except FileError:
         raise
     except Exception as error:  # a damaged file makes the parser fail in ways of every kind
-        raise FileError(
-            f"expected {path.name} to be a complete PCD file, got: {_complaint(error)}"
-        ) from error
+        raise FileError(f"expected {path.name} to be a complete PCD file, got: {_complaint(error)}") from error
     records = np.atleast_1d(cloud.pc_data)  # the parser returns a lone point without its axis
     if len(records) != cloud.metadata.points:
         raise FileError(

@@ -9,9 +9,13 @@ from jaxtyping import Float32
 from shipshape.errors import FileError
 from shipshape.pointfiles.columns import AXES, as_points, cause, listed
 
+_MAX_BYTES = 64 * 2**20  # a line in memory takes several times its length in the file
+
 
 def read_text(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
     """The one cluster of a text file: its columns x, y, z, or the first three when there is no header."""
+    if path.stat().st_size > _MAX_BYTES:
+        raise FileError(f"expected at most {_MAX_BYTES} bytes of text in {path.name}, got {path.stat().st_size}")
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
@@ -49,9 +53,7 @@ def _plain(name: str) -> str:
 def _find_axes(header: list[str], what: str) -> list[int]:
     names = [_plain(word) for word in header if word != "#"]
     if not set(AXES) <= set(names):
-        raise FileError(
-            f"expected numbers, or a header with the columns x, y, z in {what}, got {listed(header)}"
-        )
+        raise FileError(f"expected numbers, or a header with the columns x, y, z in {what}, got {listed(header)}")
     return [names.index(axis) for axis in AXES]
 
 
@@ -61,15 +63,11 @@ def _first_three(row: list[str], what: str) -> list[int]:
     return [0, 1, 2]
 
 
-def _parse(
-    lines: list[str], delimiter: str | None, columns: list[int], what: str
-) -> Float32[np.ndarray, "n 3"]:
+def _parse(lines: list[str], delimiter: str | None, columns: list[int], what: str) -> Float32[np.ndarray, "n 3"]:
     if not lines:
         raise FileError(f"expected a point a line in {what}, got a header alone")
     try:
         table = np.loadtxt(lines, delimiter=delimiter, usecols=columns, ndmin=2, comments=None)
     except ValueError as error:
-        raise FileError(
-            f"expected a number in every x, y, z column of {what}, got: {cause(error)}"
-        ) from error
+        raise FileError(f"expected a number in every x, y, z column of {what}, got: {cause(error)}") from error
     return as_points(table, what)

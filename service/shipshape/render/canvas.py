@@ -57,7 +57,8 @@ class Canvas:
     """Draws with picture pixels; everything is clipped to the picture."""
 
     def __init__(self, width: int, height: int, background: Colour) -> None:
-        self._image = np.full((height * SCALE, width * SCALE, 3), background, np.uint8)
+        self._image = np.empty((height * SCALE, width * SCALE, 3), np.uint8)
+        self.rectangle(Rect(0.0, 0.0, width, height), background)
         self._font = cv2.FontFace("sans")
 
     def rectangle(self, rect: Rect, colour: Colour) -> None:
@@ -82,9 +83,11 @@ class Canvas:
         if opacity >= 1.0:
             cv2.fillPoly(self._image, [corners], colour, cv2.LINE_AA)
             return
-        coloured = self._image.copy()
-        cv2.fillPoly(coloured, [corners], colour, cv2.LINE_AA)
-        cv2.addWeighted(coloured, opacity, self._image, 1 - opacity, 0, dst=self._image)
+        rows, columns = self._window(corners)
+        beneath = self._image[rows, columns]
+        coloured = beneath.copy()
+        cv2.fillPoly(coloured, [corners - (columns.start, rows.start)], colour, cv2.LINE_AA)
+        self._image[rows, columns] = cv2.addWeighted(coloured, opacity, beneath, 1 - opacity, 0)
 
     def arrow(self, start: Point, end: Point, colour: Colour, *, width: float = 2.0, head: float = 10.0) -> None:
         """An arrow with a filled head of `head` pixels."""
@@ -129,6 +132,13 @@ class Canvas:
         size = round(font.size * SCALE)
         left, _, width, _ = cv2.getTextSize((0, 0), text, (0, 0), self._font, size, font.weight)
         return float(left + width) / SCALE
+
+    def _window(self, corners: np.ndarray) -> tuple[slice, slice]:
+        """Rows and columns around `corners`, within the picture."""
+        height, width = self._image.shape[:2]
+        (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        rows = slice(min(max(top - 2, 0), height - 1), min(max(bottom + 3, 1), height))
+        return rows, slice(min(max(left - 2, 0), width - 1), min(max(right + 3, 1), width))
 
     def to_png(self) -> bytes:
         """The picture as the bytes of a PNG file."""
