@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -86,7 +86,7 @@ class Settings(BaseSettings):
     )
 
     @model_validator(mode="after")
-    def _a_scan_fits_the_queue(self) -> Self:
+    def _a_scan_fits_the_queue(self) -> "Settings":
         if self.queue_limit < self.max_contacts:
             raise ValueError(f"expected at least max_contacts, {self.max_contacts}, got {self.queue_limit}")
         return self

@@ -43,7 +43,10 @@ class FakeVessel:
 class FakeBundle:
     name: str = "fake"
     digest: str = DIGEST
-    catalogue: tuple = (FakeVessel("tug", ReferenceBox(20, 8, 10)), FakeVessel("rhib", ReferenceBox(9, 2.5, 3)))
+    catalogue: tuple = (
+        FakeVessel("tug", ReferenceBox(20.0, 8.0, 10.0)),
+        FakeVessel("rhib", ReferenceBox(9.0, 2.5, 3.0)),
+    )
     scores: dict = field(default_factory=lambda: {"p": {"accuracy": 0.99}, "note": "made up"})
 
 
@@ -99,7 +102,7 @@ def recognition_of(work, stage_ms):
         bow_probability=0.875,
         aspect_deg=30.0,
         true_heading_deg=None if own is None else own % 360,
-        box=Box((40.0, 1.5, -2.0), ReferenceBox(20, 8, 10)),
+        box=Box((40.0, 1.5, -2.0), ReferenceBox(20.0, 8.0, 10.0)),
         restored=RestoredCloud(np.concatenate([points, -points]), np.arange(2 * len(points)) < len(points)),
         images=ImagePair(image, 255 - image),
         keypoints_level=points[:3].copy(),

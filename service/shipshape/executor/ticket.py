@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 from shipshape.errors import Cancelled, DeadlineExceeded
 
@@ -15,6 +15,7 @@ W_contra = TypeVar("W_contra", contravariant=True)
 R = TypeVar("R")
 
 
+@runtime_checkable  # so that shape-checked tests can check it
 class Stage(Protocol[W_contra]):
     """One step of the work; it keeps its results in the work item."""
 

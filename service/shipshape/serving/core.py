@@ -5,7 +5,7 @@ contact + wishes + deadline -> checks -> executor -> answer
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
 from shipshape.executor import Executor, Stage, Task, Ticket
@@ -15,6 +15,7 @@ from shipshape.types import Contact, Options, Recognition, ReferenceBox
 Render = Callable[[Contact, Recognition], bytes]  # -> PNG
 
 
+@runtime_checkable  # so that shape-checked tests can check it
 class PipelineLike(Protocol):
     """What the core needs of a pipeline; `Any` is its work item, which only its own stages read."""
 
@@ -32,6 +33,7 @@ class PipelineLike(Protocol):
         ...
 
 
+@runtime_checkable  # so that shape-checked tests can check it
 class CatalogueEntry(Protocol):
     """One vessel that the bundle knows."""
 
@@ -46,6 +48,7 @@ class CatalogueEntry(Protocol):
         ...
 
 
+@runtime_checkable  # so that shape-checked tests can check it
 class BundleLike(Protocol):
     """What the core tells of a bundle."""
 
