@@ -162,7 +162,7 @@ def test_check_prints_bundle_answer_and_stages(pipeline, capsys):
 
 def test_bundle_verify_prints_the_signatures(tmp_path, monkeypatch, capsys):
     write_tiny_bundle(tmp_path / "bundle")
-    monkeypatch.setattr(commands, "Pipeline", lambda bundle: None)
+    monkeypatch.setattr(commands, "Pipeline", lambda bundle: FakePipeline())
     assert main(["bundle", "verify", str(tmp_path / "bundle")]) == 0
     assert "prior: x float32[-1, 3] -> doubled float32[-1, 3], sums float32[-1]" in capsys.readouterr().out
 

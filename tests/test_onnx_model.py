@@ -43,9 +43,7 @@ def test_another_signature_is_refused(content, came):
 
 @pytest.mark.parametrize("kept", [0, 1, 50, 150])
 def test_a_truncated_file_is_refused_in_one_sentence(kept, capfd):
-    with pytest.raises(
-        BundleError, match=rf"expected prior\.onnx to be a complete .* got {kept} bytes"
-    ) as caught:
+    with pytest.raises(BundleError, match=rf"expected prior\.onnx to be a complete .* got {kept} bytes") as caught:
         OnnxModel(doubling_onnx()[:kept], label="prior.onnx")
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
@@ -54,3 +52,20 @@ def test_a_truncated_file_is_refused_in_one_sentence(kept, capfd):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(BundleError, match=r"gone\.onnx, got: No such file"):
         OnnxModel(tmp_path / "gone.onnx")
+
+
+@pytest.mark.parametrize(
+    ("inputs", "given"),
+    [
+        ({"x": np.zeros((1, 4), np.float32)}, r"x float32\[1, 4\]"),
+        ({"x": np.zeros((1, 3))}, r"x float64\[1, 3\]"),
+        ({"y": np.zeros((1, 3), np.float32)}, r"y float32\[1, 3\]"),
+    ],
+    ids=["shape", "dtype", "name"],
+)
+def test_a_network_for_other_inputs_is_the_bundles_fault(inputs, given, capfd):
+    model = OnnxModel(doubling_onnx(), label="prior.onnx")
+    sentence = rf"expected prior\.onnx to take {given}, got a network for x float32\[-1, 3\]"
+    with pytest.raises(BundleError, match=sentence):
+        model.run(**inputs)
+    assert capfd.readouterr() == ("", "")

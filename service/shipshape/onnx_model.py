@@ -55,6 +55,7 @@ class OnnxModel:
 
     def __init__(self, source: Path | bytes, signature: Signature | None = None, *, label: str = "") -> None:
         label = label or (source.name if isinstance(source, Path) else "the model")
+        self._label = label
         self._session = _open_session(source, label)
         self.signature = _read_signature(self._session)
         if signature is not None:
@@ -62,8 +63,17 @@ class OnnxModel:
         self._output_names = [spec.name for spec in self.signature.outputs]
 
     def run(self, **inputs: np.ndarray) -> list[np.ndarray]:
-        """The outputs, in the order of the signature, for inputs of its names, shapes and dtypes."""
-        outputs: list[np.ndarray] = self._session.run(self._output_names, inputs)
+        """The outputs, in the order of the signature, for inputs of its names, shapes and dtypes.
+
+        Raises:
+            BundleError: The network does not take such inputs, so it is not the one that its caller was made for.
+        """
+        try:
+            outputs: list[np.ndarray] = self._session.run(self._output_names, inputs)
+        except Exception as error:  # onnxruntime's own exceptions share no base class
+            wanted = _listed(self.signature.inputs)
+            given = ", ".join(f"{name} {array.dtype}{list(array.shape)}" for name, array in inputs.items())
+            raise BundleError(f"expected {self._label} to take {given}, got a network for {wanted}") from error
         return outputs
 
 
