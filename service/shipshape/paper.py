@@ -26,6 +26,7 @@ class PaperMethod:
         self._boxes = [vessel.box for vessel in bundle.catalogue]
         self._longest = max(box.length for box in self._boxes)
         self._parameters = bundle.parameters["paper"]
+        self._spd2_radius = bundle.parameters["common"]["spd2_radius"]
 
     def heading(self, work: Work) -> None:
         """Best IoU with the reference box of the prior's class, laid against the visible faces."""
@@ -39,7 +40,7 @@ class PaperMethod:
         """Part labels of the SPD2 images of the densest points."""
         points = work.pose.to_vessel(work.contact.points_level)
         parts = keypoints.select_keypoints(points, KeypointParams(limit=self._parameters["part_keypoints"]))
-        images = spd2.describe(points, parts, self._parameters["spd2_radius"])
+        images = spd2.describe(points, parts, self._spd2_radius)
         work.pose, work.bow_probability = bow_stern.by_parts(
             images,
             parts[:, 0],

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from shipshape.types import ReferenceBox
-
 from shipshape_lab.simulator.vessels import build_vessel
 
 

@@ -4,13 +4,12 @@ Everything that a network sees is made by the stage code of the service, so that
 drift apart.
 """
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from shipshape.types import Contact, Pose, ReferenceBox
 
+from shipshape.types import Contact, Pose, ReferenceBox
 from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, load, load_surfaces
 from shipshape_lab.simulator.vessels import CATALOGUE
 
@@ -90,25 +89,4 @@ def mirrored(example: Example) -> Example:
         Pose(-example.pose.heading, (x, -y, z), example.pose.size),
         example.label,
         example.surface_level * mirror,
-    )
-
-
-def disturbed(pose: Pose, rng: np.random.Generator, *, wide: bool) -> Pose:
-    """A pose as an earlier stage might hand it on: turned, shifted and of another size.
-
-    Args:
-        pose: the truth.
-        rng: chance.
-        wide: the errors of the first look along the line of sight; otherwise those after the aligned looks.
-    """
-    turn, shift, scale = (10.0, 0.08, 0.15) if wide else (1.5, 0.015, 0.05)
-    spread = rng.choice([0.3, 1.0, 2.5], p=[0.4, 0.45, 0.15])
-    length = pose.size.length
-    step = rng.normal(0.0, shift * spread * length, 3) * np.array([1.0, 0.6, 0.4])
-    grown = length * math.exp(rng.normal(0.0, scale * min(spread, 1.5)))
-    x, y, z = np.array(pose.origin_level) + step
-    return Pose(
-        pose.heading + math.radians(rng.normal(0.0, turn * spread)),
-        (float(x), float(y), float(z)),
-        ReferenceBox(grown, pose.size.beam, pose.size.height),
     )

@@ -32,6 +32,7 @@ class _Encoder(nn.Module):
         )
 
     def forward(self, planes: Tensor, features: Tensor) -> Tensor:
+        """Image (n, planes, rows, columns) and features (n, f) to (n, 192)."""
         return self.mix(torch.cat([self.image(planes).flatten(1), features], dim=1))
 
 
@@ -44,6 +45,7 @@ class SightNet(nn.Module):
         self.axis, self.shift, self.size = nn.Linear(192, 2), nn.Linear(192, 2), nn.Linear(192, 3)
 
     def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
+        """Image and features to the outputs named above, in that order."""
         seen = self.encode(planes, features)
         return self.axis(seen), self.shift(seen), self.size(seen) + 2.0
 
@@ -58,6 +60,7 @@ class AlignedNet(nn.Module):
         self.shift, self.size, self.classes = nn.Linear(192, 3), nn.Linear(192, 3), nn.Linear(192, classes)
 
     def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
+        """Image and features to the outputs named above, in that order."""
         seen = self.encode(planes, features)
         turn = self.turn(seen)
         turn = torch.cat([0.6 * torch.tanh(turn[:, :1]), turn[:, 1:].clamp(-7.0, 1.0)], dim=1)
@@ -124,6 +127,7 @@ class InpaintingNet(nn.Module):
         self.register_buffer("thickness", upper - lower)
 
     def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
+        """Image and features to the outputs named above, in that order."""
         levels = self.unet.encode(planes)
         bottleneck = levels[-1] + self.inject(features)[:, :, None, None]
         out = self.head(self.unet.decode(levels, bottleneck))
@@ -139,16 +143,21 @@ class InpaintingNet(nn.Module):
 
 
 class GreyNet(nn.Module):
-    """The paper's inpainting: grey image in [0, 1], three layers as channels -> the same, completed."""
+    """The paper's inpainting: grey image in [0, 1], three layers as channels -> the same, completed.
 
-    def __init__(self, width: int = 12) -> None:
+    Works on 2 x 2 pixels at a time, which quarters the cost of every level.
+    """
+
+    def __init__(self, width: int = 16) -> None:
         super().__init__()
-        self.unet = UNet(3, width)
-        self.head = nn.Conv2d(width, 3, 1)
+        self.fold, self.unfold = nn.PixelUnshuffle(2), nn.PixelShuffle(2)
+        self.unet = UNet(12, width)
+        self.head = nn.Conv2d(width, 12, 1)
 
     def forward(self, image: Tensor) -> Tensor:
-        levels = self.unet.encode(image)
-        return torch.sigmoid(self.head(self.unet.decode(levels, levels[-1])))
+        """(n, 3, 64, 64) to the same."""
+        levels = self.unet.encode(self.fold(image))
+        return torch.sigmoid(self.unfold(self.head(self.unet.decode(levels, levels[-1]))))
 
 
 class Spd2Net(nn.Module):
@@ -171,4 +180,5 @@ class Spd2Net(nn.Module):
         )
 
     def forward(self, images: Tensor) -> Tensor:
+        """(n, 5, 16, 32) to (n, classes)."""
         return self.layers(images)

@@ -8,16 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from shipshape import alignment, frames
-from shipshape.types import Pose
 from torch import Tensor, nn
 
+from shipshape import alignment, frames
+from shipshape.types import Pose
 from shipshape_lab.simulator.vessels import CATALOGUE
 from shipshape_lab.training import arguments, export, loop
-from shipshape_lab.training.examples import Example, Examples, disturbed
+from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import AlignedNet
+from shipshape_lab.training.poses import disturbed
 
-EPOCHS = 18
+EPOCHS = 14
 CLASSES = len(CATALOGUE) + 1
 
 

@@ -8,28 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from shipshape import raster
-from shipshape.stages import heading, projection
-from shipshape.types import ImageMethod, Pose, ReferenceBox
 from torch import Tensor, nn
 
+from shipshape import raster
+from shipshape.stages import projection
+from shipshape.types import ImageMethod, ReferenceBox
 from shipshape_lab.simulator.vessels import CATALOGUE
 from shipshape_lab.training import arguments, export, loop
 from shipshape_lab.training.catalogue import reference_boxes
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import GreyNet
+from shipshape_lab.training.poses import paper_pose
 
-EPOCHS = 5
-
-
-def paper_pose(example: Example, boxes: list[ReferenceBox]) -> Pose:
-    """The pose that the paper's search finds when the class and the bow are right."""
-    points, box = example.contact.points_level, boxes[example.label]
-    axis = heading.by_area_projection(points, box)
-    if np.cos(axis - example.pose.heading) < 0:
-        axis += np.pi
-    height = example.contact.sensor_height
-    return heading.anchor_box(points, axis, box, points[:, 2].min() if height is None else -height)
+EPOCHS = 4
 
 
 def to_item(example: Example, method: ImageMethod, boxes: list[ReferenceBox]) -> dict:

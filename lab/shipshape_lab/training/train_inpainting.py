@@ -8,17 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor, nn
+
 from shipshape import raster
 from shipshape.stages import inpainting, projection
 from shipshape.types import Pose
-from torch import Tensor, nn
-
 from shipshape_lab.simulator.vessels import CATALOGUE
 from shipshape_lab.training import arguments, export, loop
-from shipshape_lab.training.examples import Example, Examples, disturbed
+from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import InpaintingNet
+from shipshape_lab.training.poses import disturbed
 
-EPOCHS = 14
+EPOCHS = 12
 CLASSES = len(CATALOGUE) + 1
 WRONG_BOW = 0.01  # share of poses with bow and stern swapped, about what bow_stern leaves
 

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from shipshape import frames, sight
-from shipshape.stages import heading
 from torch import Tensor, nn
 
+from shipshape import frames, sight
+from shipshape.stages import heading
 from shipshape_lab.training import arguments, export, loop
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import SightNet
 
-EPOCHS = 14
+EPOCHS = 8
 
 
 def to_item(example: Example) -> dict:

@@ -1,0 +1,57 @@
+"""Calibrate the trained networks on the validation set and write them as a verified bundle.
+
+python -m shipshape_lab.training.build_bundle --data runs/data --out runs/default --to models
+"""
+
+import argparse
+import shutil
+import subprocess
+from pathlib import Path
+
+from shipshape.bundle import Bundle
+from shipshape.bundle_writer import write_manifest
+from shipshape_lab.training.calibrate import calibrated
+from shipshape_lab.training.examples import Examples
+from shipshape_lab.training.partial import catalogue_vessels, partial_bundle
+
+
+def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
+    """The finished bundle in the folder `to`, read back and verified."""
+    validation = Examples.read(data, "validation")
+    parameters = calibrated(partial_bundle(networks), validation, seed=seed)
+    to.mkdir(parents=True, exist_ok=True)
+    files = sorted(networks.glob("*.onnx"))
+    for file in files:
+        shutil.copyfile(file, to / file.name)
+    return write_manifest(
+        to,
+        name="default",
+        training={"commit": _commit(), "seed": seed, "validation_clusters": len(validation)},
+        catalogue=catalogue_vessels(),
+        models={file.stem: Path(file.name) for file in files},
+        parameters=parameters,
+        scores={},
+    )
+
+
+def _commit() -> str:
+    found = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, check=False)
+    return found.stdout.strip() or "unknown"
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Calibrate and write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True, help="folder of the data sets")
+    parser.add_argument("--out", type=Path, required=True, help="folder whose bundle/ holds the trained networks")
+    parser.add_argument("--to", type=Path, required=True, help="folder of the finished bundle")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the draws of the validation set")
+    args = parser.parse_args(argv)
+    bundle = build(args.data, args.out / "bundle", args.to, seed=args.seed)
+    print(f"bundle {bundle.name} {bundle.digest[:12]} with {len(bundle.models)} networks in {args.to}")
+    for table, values in bundle.parameters.items():
+        print(f"  {table}: {values}")
+
+
+if __name__ == "__main__":
+    main()

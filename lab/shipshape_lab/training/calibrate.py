@@ -1,0 +1,178 @@
+"""Fit what a bundle measures rather than trains, on the validation set alone.
+
+Fitted: the prior's temperature; the paper's threshold of grey, sharpness of part votes and spread of heading; the
+best preset's spread of heading, temperature of the bow, weights of the evidence and threshold of "unknown".
+"""
+
+import copy
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+from tqdm import tqdm
+
+from shipshape import frames, raster
+from shipshape.bundle import Bundle
+from shipshape.pipeline import Pipeline
+from shipshape.stages import bow_stern, classification, keypoints, prior, projection, spd2
+from shipshape.stages.classification import softmax
+from shipshape.stages.keypoints import KeypointParams
+from shipshape.types import ImageMethod, Options, Preset
+from shipshape_lab.training.examples import Example, Examples
+from shipshape_lab.training.partial import run_until
+
+KNOWN_KEPT = 0.995  # share of catalogue vessels that the threshold of "unknown" must leave known
+
+
+@dataclass(frozen=True)
+class BestEvidence:
+    """What preset `best` saw of one validation contact."""
+
+    turn_error: float  # rad, modulo pi
+    heading_std: float  # rad, as the network says it
+    flip_logit: float
+    flipped: bool  # whether the bow truly pointed the other way
+    witnesses: np.ndarray  # (4, classes) probabilities in the order that fusion weighs them
+    label: int
+
+
+def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> dict:
+    """The bundle's parameters, fitted."""
+    parameters = copy.deepcopy(dict(bundle.parameters))
+    rng = np.random.default_rng(seed)
+    contacts = [validation.drawn(int(i), rng) for i in validation.indices]
+    catalogue = [example for example in contacts if example.label < len(bundle.catalogue)]
+    pipeline = Pipeline(bundle)
+    parameters["common"]["prior_temperature"] = prior_temperature(pipeline, contacts)
+    parameters["paper"].update(paper_parameters(pipeline, catalogue))
+    pipeline = Pipeline(_with(bundle, parameters))
+    best, unknown_above = best_parameters(
+        [_best_evidence(pipeline, example) for example in _bar(contacts, "best")]
+    )
+    parameters["best"].update(best)
+    parameters["common"]["unknown_above"] = unknown_above
+    return parameters
+
+
+def _with(bundle: Bundle, parameters: dict) -> Bundle:
+    return Bundle(bundle.name, bundle.digest, bundle.catalogue, bundle.models, parameters, {}, {})
+
+
+def _bar(items: list, title: str) -> tqdm:
+    return tqdm(items, desc=f"calibrate {title}", mininterval=2.0)
+
+
+def prior_temperature(pipeline: Pipeline, contacts: list[Example]) -> float:
+    """Temperature that minimises the negative log-likelihood of the prior's mean confidence."""
+    model, radius = pipeline.bundle.models["prior"], pipeline.bundle.parameters["common"]["spd2_radius"]
+    images = []
+    for example in _bar(contacts, "prior"):
+        points = pipeline.begin(example.contact, Options()).points_sight
+        images.append(spd2.describe(points, keypoints.select_keypoints(points, KeypointParams()), radius))
+
+    def loss(temperature: float) -> float:
+        chances = [
+            prior.estimate_prior(image, model, temperature=temperature)[example.label]
+            for image, example in zip(images, contacts, strict=True)
+        ]
+        return -float(np.log(np.maximum(chances, 1e-7)).mean())
+
+    return float(minimize_scalar(loss, bounds=(0.3, 5.0), method="bounded", options={"maxiter": 12}).x)
+
+
+def paper_parameters(pipeline: Pipeline, catalogue: list[Example]) -> dict:
+    """Spread of the heading (1.4826 MAD), sharpness of part votes, and the grey threshold of best overlap."""
+    errors, votes, ahead = [], [], []
+    for example in _bar(catalogue, "paper"):
+        work = run_until(pipeline, example.contact, Options(Preset.PAPER), "heading")
+        errors.append(frames.wrap_half_turn(work.pose.heading - example.pose.heading))
+        votes.append(_part_votes(pipeline, work))
+        ahead.append(math.cos(work.pose.heading - example.pose.heading) > 0)
+    return {
+        "heading_std": float(1.4826 * np.median(np.abs(errors))),
+        "part_sharpness": _sharpness(np.array(votes), np.array(ahead)),
+        "empty_below": _empty_below(pipeline, catalogue[:: max(len(catalogue) // 300, 1)]),
+    }
+
+
+def _part_votes(pipeline: Pipeline, work) -> float:
+    parameters = pipeline.bundle.parameters
+    points = work.pose.to_vessel(work.contact.points_level)
+    parts = keypoints.select_keypoints(points, KeypointParams(limit=parameters["paper"]["part_keypoints"]))
+    images = spd2.describe(points, parts, parameters["common"]["spd2_radius"])
+    (logits,) = pipeline.bundle.models["parts"].run(images=images)
+    return bow_stern.part_votes(parts[:, 0], softmax(logits), work.pose.size.length)
+
+
+def _sharpness(votes: np.ndarray, ahead: np.ndarray) -> float:
+    signs = np.where(ahead, 1.0, -1.0) * votes
+    return float(
+        minimize_scalar(lambda k: np.logaddexp(0, -k * signs).mean(), bounds=(0.01, 50), method="bounded").x
+    )
+
+
+def _empty_below(pipeline: Pipeline, catalogue: list[Example]) -> float:
+    """Grey threshold with the best mean overlap (IoU) of filled pixels over the four image methods."""
+    thresholds = np.linspace(0.02, 0.5, 13)
+    overlaps = np.zeros(len(thresholds))
+    for method in ImageMethod:
+        model = pipeline.bundle.models[f"inpainting_{method}"]
+        for example in _bar(catalogue, f"grey {method}"):
+            work = run_until(pipeline, example.contact, Options(Preset.PAPER, method), "projection")
+            layers = projection.project(example.surface_level, work.pose, work.frame)
+            truth = raster.to_grey(layers.count > 0, layers.top, work.frame).transpose(2, 0, 1) > 0
+            (filled,) = model.run(image=work.before.transpose(2, 0, 1)[None].astype(np.float32) / 255)
+            for k, threshold in enumerate(thresholds):
+                found = filled[0] >= threshold
+                overlaps[k] += (found & truth).sum() / max((found | truth).sum(), 1)
+    return float(thresholds[np.argmax(overlaps)])
+
+
+def _best_evidence(pipeline: Pipeline, example: Example) -> BestEvidence:
+    work = run_until(pipeline, example.contact, Options(Preset.BEST), "spd2")
+    restored = classification.mean_confidence(work.images, pipeline.bundle.models["spd2"])
+    return BestEvidence(
+        turn_error=frames.wrap_half_turn(work.look.pose.heading - example.pose.heading),
+        heading_std=work.look.heading_std,
+        flip_logit=work.look.flip_logit,
+        flipped=math.cos(work.look.pose.heading - example.pose.heading) < 0,
+        witnesses=np.stack([work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]),
+        label=example.label,
+    )
+
+
+def best_parameters(seen: list[BestEvidence]) -> tuple[dict, float]:
+    """Parameters of preset `best`, and the threshold of "unknown"."""
+    ratios = np.abs([e.turn_error / e.heading_std for e in seen])
+    signs = np.array([e.flip_logit * (1 if e.flipped else -1) for e in seen])
+    temperature = minimize_scalar(
+        lambda t: np.logaddexp(0, -signs / t).mean(), bounds=(0.2, 10.0), method="bounded"
+    ).x
+    logs = np.log(np.maximum(np.stack([e.witnesses for e in seen]), 1e-7))
+    labels = np.array([e.label for e in seen])
+    weights = _fusion_weights(logs, labels)
+    fused = softmax((weights[None, :, None] * logs).sum(axis=1))
+    known = fused[labels < fused.shape[1] - 1, -1]
+    return (
+        {
+            # Scaled so that 68 % of validation errors lie within one standard deviation.
+            "heading_std_scale": float(np.quantile(ratios, 0.683)),
+            "bow_temperature": float(temperature),
+            "fusion_weights": weights.tolist(),
+        },
+        float(np.clip(np.quantile(known, KNOWN_KEPT), 0.05, 0.95)),
+    )
+
+
+def _fusion_weights(logs: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Non-negative weights of the log-linear pool with the least negative log-likelihood."""
+
+    def loss(weights: np.ndarray) -> float:
+        scores = (weights[None, :, None] * logs).sum(axis=1)
+        scores -= scores.max(axis=1, keepdims=True)
+        chance = scores[np.arange(len(labels)), labels] - np.log(np.exp(scores).sum(axis=1))
+        return -float(chance.mean())
+
+    found = minimize(loss, np.full(logs.shape[1], 0.3), bounds=[(0.0, 3.0)] * logs.shape[1], method="L-BFGS-B")
+    return found.x
