@@ -47,6 +47,7 @@ def main() -> int:
     keep = parser.parse_args().keep
     OUT.mkdir(parents=True, exist_ok=True)
     rest, grpc_address = free_address(), free_address()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: leave no service behind
     try:
         with service(rest, grpc_address) as process:
             show_scan(grpc_address)
@@ -58,6 +59,8 @@ def main() -> int:
     except DemoFailed as error:
         print(f"demo: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        return 130
     print("service stopped with exit code 0")
     return 0
 
@@ -69,7 +72,8 @@ def service(rest: str, grpc_address: str) -> Iterator[subprocess.Popen[bytes]]:
     command = [sys.executable, "-m", "shipshape", "serve", "--rest-port", rest_port, "--grpc-port", grpc_port]
     log = OUT / "service.log"
     print(f"starting the service on loopback, REST port {rest_port}, gRPC port {grpc_port} ...", flush=True)
-    with log.open("wb") as stream, subprocess.Popen(command, stderr=stream) as process:
+    # A session of its own keeps Ctrl-C from the service: it is stopped once, below.
+    with log.open("wb") as stream, subprocess.Popen(command, stderr=stream, start_new_session=True) as process:
         try:
             wait_until_ready(process, rest, log)
             yield process
@@ -204,7 +208,7 @@ def free_address() -> str:
 
 
 def wait_for_interrupt(process: subprocess.Popen[bytes]) -> None:
-    """Until Ctrl-C, which the terminal sends to the service as well, or until the service ends by itself."""
+    """Until Ctrl-C, or until the service ends by itself."""
     try:
         process.wait()
     except KeyboardInterrupt:
