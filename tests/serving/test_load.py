@@ -8,6 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import grpc
 import httpx
 import pytest
+from grpc_health.v1 import health_pb2
+from grpc_health.v1.health_pb2_grpc import HealthStub
 
 from serving.fakes import PATIENCE, cluster, request, rows, running
 from shipshape.v1 import shipshape_pb2 as pb
@@ -155,6 +157,25 @@ def test_stopping_refuses_new_requests_and_ends_those_under_way(pool):
         stopping.result()
         with pytest.raises(httpx.TransportError):
             doors.rest.get("/livez")
+
+
+def test_a_watcher_of_health_does_not_hold_up_the_stop(pool):
+    with running(drain_s=10 * PATIENCE) as doors:
+        watch = HealthStub(doors.channel).Watch(health_pb2.HealthCheckRequest())
+        assert next(watch).status == health_pb2.HealthCheckResponse.SERVING
+        stopping = pool.submit(doors.service.stop)
+        assert next(watch).status == health_pb2.HealthCheckResponse.NOT_SERVING
+        stopping.result(PATIENCE)
+
+
+def test_a_caller_that_leaves_half_way_is_no_internal_error(caplog):
+    with running() as doors:
+        with socket.create_connection(("127.0.0.1", doors.addresses.rest_port)) as client:
+            client.sendall(b"POST /v1/recognise HTTP/1.1\r\nHost: x\r\nContent-Length: 4800\r\n\r\nabc")
+            until(lambda: 'shipshape_in_flight{door="rest"} 1.0' in doors.rest.get("/metrics").text)
+        cancelled = 'method="recognise",outcome="cancelled"} 1.0'
+        until(lambda: cancelled in doors.rest.get("/metrics").text)
+    assert "internal error" not in caplog.text
 
 
 def refuses(doors):

@@ -22,6 +22,8 @@ from shipshape.serving.warmup import warm_up
 from shipshape.settings import Settings
 from shipshape.telemetry import Metrics
 
+LAST_WORDS_S = 0.5  # to write the answers that the drained work gave
+
 _logger = logging.getLogger(__name__)
 
 
@@ -84,8 +86,9 @@ class Service:
         self._grpc.close()
         self._metrics.set_ready(False)
         end = time.monotonic() + self._settings.drain_s
-        grpc_stopped = self._grpc.begin_stop(self._settings.drain_s)  # both doors drain at the same time
+        self._grpc.begin_stop(self._settings.drain_s)  # both doors drain at the same time
         self._rest.stop(self._settings.drain_s)
-        grpc_stopped.wait()
         if not self.executor.stop(max(0.0, end - time.monotonic())):
             _logger.warning("work was still under way after %s s and was dropped", self._settings.drain_s)
+        # All answers are known; what still hangs on are watchers of health, who would stay for ever.
+        self._grpc.begin_stop(LAST_WORDS_S).wait()

@@ -71,7 +71,10 @@ class GrpcDoor:
         self._set(health_pb2.HealthCheckResponse.NOT_SERVING)
 
     def begin_stop(self, drain_s: float) -> threading.Event:
-        """Accept no more; set once all under way has ended, or was broken off after `drain_s` seconds."""
+        """Accept no more; set once all under way has ended, or was broken off after `drain_s` seconds.
+
+        Called again, it shortens what is left of `drain_s`.
+        """
         return self._server.stop(drain_s)
 
     def _set(self, status: int) -> None:

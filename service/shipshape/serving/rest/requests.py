@@ -6,8 +6,9 @@ from typing import Any, TypeVar
 from fastapi import HTTPException, Request
 from pydantic import BaseModel, ValidationError
 from pydantic_core import from_json
+from starlette.requests import ClientDisconnect
 
-from shipshape.errors import InvalidInput
+from shipshape.errors import Cancelled, InvalidInput
 from shipshape.serving.encoding import (
     Limits,
     Wishes,
@@ -36,15 +37,23 @@ M = TypeVar("M", bound=BaseModel)
 
 
 async def read_body(request: Request, limits: Limits) -> bytes:
-    """The whole body; raises TooLarge as soon as it is known to be over the limit, declared or not."""
+    """The whole body.
+
+    Raises:
+        TooLarge: It is over the limit, as soon as that is known, whether its length was declared or not.
+        Cancelled: The caller left half-way.
+    """
     declared = request.headers.get("content-length", "")
     if declared.isdecimal():
         check_body(int(declared), limits)
     chunks, size = [], 0
-    async for chunk in request.stream():
-        size += len(chunk)
-        check_body(size, limits)
-        chunks.append(chunk)
+    try:
+        async for chunk in request.stream():
+            size += len(chunk)
+            check_body(size, limits)
+            chunks.append(chunk)
+    except ClientDisconnect as error:
+        raise Cancelled("the caller left before its request was complete") from error
     return b"".join(chunks)
 
 

@@ -1,7 +1,7 @@
 """The handlers of the REST door: translate, delegate to the core, translate back."""
 
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from fastapi import HTTPException, Request, Response
 from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
@@ -29,10 +29,13 @@ from shipshape.serving.timing import Timeouts, server_timing, summed
 from shipshape.telemetry import OK, SINGLE, Metrics, new_request_id, request_id
 
 Handler = Callable[[Request], Awaitable[Response]]
+T = TypeVar("T")
+SMALL_BYTES = 64 * 2**10  # of a body: JSON of this size is parsed in under a millisecond
+SMALL_SCAN = 32  # contacts: written in under a millisecond
 
 
 class Routes:
-    """One method a path. Parsing and writing of bodies happen off the event loop."""
+    """One method a path. Large bodies are parsed and written off the event loop."""
 
     def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts) -> None:
         self._core = core
@@ -90,9 +93,9 @@ class Routes:
             contact, wishes = parse(body, request.query_params, self._core.limits)
             return self._core.submit(contact, wishes, deadline), wishes
 
-        ticket, wishes = await run_in_threadpool(submit)
+        ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         await until_settled([ticket], request)
-        return await run_in_threadpool(_single, ticket, wishes)
+        return await _run(lambda: _single(ticket, wishes), small=not _bulky(wishes))
 
     async def _scan(self, request: Request) -> Response:
         deadline, body = self._deadline(request), await self._body(request)
@@ -102,9 +105,10 @@ class Routes:
             ids, contacts, wishes = parse_scan(body, request.query_params, self._core.limits)
             return ids, self._core.submit_scan(contacts, wishes, deadline), wishes
 
-        ids, scan, wishes = await run_in_threadpool(submit)
+        ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         await until_settled(scan.tickets, request)
-        return await run_in_threadpool(self._many, ids, scan, wishes)
+        small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
+        return await _run(lambda: self._many(ids, scan, wishes), small=small)
 
     async def _model(self, request: Request) -> Response:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
@@ -121,6 +125,15 @@ class Routes:
 
     async def _body(self, request: Request) -> bytes:
         return await read_body(request, self._core.limits)
+
+
+async def _run(work: Callable[[], T], *, small: bool) -> T:
+    """Do the work here if it takes less than handing it to a thread, else where it holds nobody up."""
+    return work() if small else await run_in_threadpool(work)
+
+
+def _bulky(wishes: Wishes) -> bool:
+    return wishes.restored or wishes.images or wishes.png
 
 
 def _single(ticket: Ticket[Answer], wishes: Wishes) -> Response:
