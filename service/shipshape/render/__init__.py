@@ -60,7 +60,7 @@ def _draw_images(canvas: Canvas, recognition: Recognition) -> None:
         frame = Rect(x, _TOP + index * (height + GAP), width, height)
         area = _panel(canvas, frame, f"{title}, {image.shape[1]} × {image.shape[0]} pixels")
         draw_image(canvas, Rect(area.x, area.y - 8, area.width, area.height + 30), image)
-        draw_layer_legend(canvas, frame.right - 16, frame.y + 23)
+        draw_layer_legend(canvas, frame.right - 16, frame.y + 23, recognition.image_method)
 
 
 def _draw_restored(canvas: Canvas, recognition: Recognition) -> None:

@@ -4,12 +4,12 @@ import numpy as np
 
 from shipshape.render.canvas import Canvas, Font, Rect
 from shipshape.render.style import BACKGROUND, FAINT, MUTED, PANEL_EDGE, Colour
+from shipshape.types import ImageMethod
 
-_LAYERS: tuple[tuple[str, Colour], ...] = (
-    ("lower", (255, 120, 60)),
-    ("middle", (80, 220, 90)),
-    ("upper", (80, 90, 255)),
-)
+_LAYER_COLOURS: tuple[Colour, ...] = ((255, 120, 60), (80, 220, 90), (80, 90, 255))
+_TOP_LAYERS = ("lower", "middle", "upper")
+_SIDE_LAYERS = ("starboard", "middle", "port")  # the side view is divided across the vessel
+_SIDE_VIEWS = (ImageMethod.FULL_SIDE, ImageMethod.Z_SIDE)
 
 
 def draw_image(canvas: Canvas, area: Rect, image: np.ndarray) -> None:
@@ -25,14 +25,15 @@ def draw_image(canvas: Canvas, area: Rect, image: np.ndarray) -> None:
 def _displayed(image: np.ndarray) -> np.ndarray:
     """The layers mixed in colours that can be told apart on a dark ground, from a visible least value up."""
     light = np.where(image > 0, 0.25 + 0.75 / 255 * image, 0.0)
-    mixed = np.minimum(light @ np.array([colour for _, colour in _LAYERS], np.float64), 255)
+    mixed = np.minimum(light @ np.array(_LAYER_COLOURS, np.float64), 255)
     return np.where(image.any(axis=2, keepdims=True), mixed, BACKGROUND).astype(np.uint8)
 
 
-def draw_layer_legend(canvas: Canvas, right: float, y: float) -> None:
-    """Which colour is which layer, ending at `right`."""
+def draw_layer_legend(canvas: Canvas, right: float, y: float, method: ImageMethod | None) -> None:
+    """Which colour is which layer of an image of `method` (None: the top view of preset best), up to `right`."""
+    names = _SIDE_LAYERS if method in _SIDE_VIEWS else _TOP_LAYERS
     font = Font(MUTED, 12.0, anchor="right")
-    for name, colour in reversed(_LAYERS):
+    for name, colour in reversed(list(zip(names, _LAYER_COLOURS, strict=True))):
         right -= canvas.text(name, (right, y), font) + 8
         canvas.rectangle(Rect(right - 6, y - 9, 9, 9), colour)
         right -= 20

@@ -34,9 +34,10 @@ def draw_restored_oblique(canvas: Canvas, area: Rect, recognition: Recognition) 
 
 def draw_restored_from_above(canvas: Canvas, area: Rect, recognition: Recognition) -> None:
     """The chart, with the wedge of +- two standard deviations of the heading."""
-    view = _fit(canvas, area, from_above(), recognition)
+    wedge = _wedge(recognition)
+    view = _fit(canvas, area, from_above(), recognition, *wedge)
     corners = box_corners(recognition.box, recognition.heading)
-    _draw_wedge(view, recognition)
+    canvas.polygon([view.spot(point) for point in wedge], FAINT, opacity=0.55)
     _draw_cloud(view, recognition)
     _draw_edges(view, corners, _EDGES[4:])
     _draw_bow(view, recognition)
@@ -60,10 +61,10 @@ def draw_point_legend(canvas: Canvas, right: float, y: float, recognition: Recog
         right -= 16
 
 
-def _fit(canvas: Canvas, area: Rect, projection: Projection, recognition: Recognition) -> View:
-    """A view that holds the whole vessel, its box and its bow arrow."""
+def _fit(canvas: Canvas, area: Rect, projection: Projection, recognition: Recognition, *more: np.ndarray) -> View:
+    """A view that holds the whole vessel, its box, its bow arrow and `more` points."""
     box, heading = recognition.box, recognition.heading
-    shown = [recognition.restored.points_level, box_corners(box, heading), *bow_line(box, heading)]
+    shown = [recognition.restored.points_level, box_corners(box, heading), *bow_line(box, heading), *more]
     return View(canvas, area, projection, np.vstack(shown))
 
 
@@ -90,10 +91,10 @@ def _draw_bow(view: View, recognition: Recognition) -> None:
     view.canvas.arrow(view.spot(bow), view.spot(tip), BOW, width=2.5, head=13.0)
 
 
-def _draw_wedge(view: View, recognition: Recognition) -> None:
+def _wedge(recognition: Recognition) -> list[np.ndarray]:
+    """Corners of the sector in which the bow lies within two standard deviations, level frame."""
     middle, tip = bow_line(recognition.box, recognition.heading)
     reach = float(np.linalg.norm(tip - middle))
     spread = min(2 * recognition.heading_std, math.pi / 2)
     angles = recognition.heading + np.linspace(-spread, spread, 17)
-    arc = [middle + reach * np.array([math.cos(angle), math.sin(angle), 0]) for angle in angles]
-    view.canvas.polygon([view.spot(middle), *map(view.spot, arc)], FAINT, opacity=0.55)
+    return [middle, *(middle + reach * np.array([math.cos(angle), math.sin(angle), 0.0]) for angle in angles)]
