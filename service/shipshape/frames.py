@@ -51,4 +51,5 @@ def aspect_deg(heading: float, origin_level: tuple[float, float, float]) -> floa
 
 def true_heading_deg(heading: float, own_true_heading_deg: float) -> float:
     """The vessel's heading clockwise from true north, in [0, 360), from the caller's own true heading."""
-    return (own_true_heading_deg - math.degrees(heading)) % 360.0
+    clockwise = (own_true_heading_deg - math.degrees(heading)) % 360.0
+    return 0.0 if clockwise == 360.0 else clockwise  # the remainder of a tiny negative number rounds up to 360

@@ -37,7 +37,10 @@ class Pipeline:
     def __init__(self, bundle: Bundle, limits: ContactLimits | None = None) -> None:
         self.bundle = bundle
         self.limits = limits or ContactLimits()
-        self._methods: dict[Preset, PaperMethod | BestMethod] = {Preset.PAPER: PaperMethod(bundle), Preset.BEST: BestMethod(bundle)}
+        self._methods: dict[Preset, PaperMethod | BestMethod] = {
+            Preset.PAPER: PaperMethod(bundle),
+            Preset.BEST: BestMethod(bundle),
+        }
         self._names = [vessel.name for vessel in bundle.catalogue]
         self._common = bundle.parameters["common"]
         self.stages = (
@@ -85,7 +88,7 @@ class Pipeline:
             vessel=self._names[best],
             probability=float(work.probabilities[best]),
             probabilities=dict(zip([*self._names, UNKNOWN], map(float, work.probabilities), strict=True)),
-            unknown=bool(work.probabilities[-1] > self._common["unknown_above"]),
+            unknown=self._is_unknown(work),
             heading=pose.heading,
             heading_std=work.heading_std,
             bow_probability=work.bow_probability,
@@ -104,6 +107,10 @@ class Pipeline:
 
     def _method(self, work: Work) -> PaperMethod | BestMethod:
         return self._methods[work.options.preset]
+
+    def _is_unknown(self, work: Work) -> bool:
+        *known, unknown = work.probabilities
+        return bool(unknown > min(max(known), self._common["unknown_above"]))
 
     def _prior(self, work: Work) -> None:
         densest = keypoints.select_keypoints(work.points_sight, KeypointParams())

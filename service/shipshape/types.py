@@ -105,7 +105,11 @@ class RestoredCloud:
 
 @dataclass(frozen=True, slots=True)
 class ImagePair:
-    """The projected image and the inpainted one, B G R = lower, middle, upper layer; 0 is empty."""
+    """The projected image and the inpainted one, 0 where empty.
+
+    B, G, R hold the layers of depth in ascending order: lower, middle, upper in a top view; starboard, middle,
+    port in a side view.
+    """
 
     before: UInt8[np.ndarray, "rows columns 3"]
     after: UInt8[np.ndarray, "rows columns 3"]

@@ -1,0 +1,30 @@
+"""shipshape-lab: simulate, train, evaluate. Every command is also a module that can be run with python -m."""
+
+import importlib
+import sys
+
+COMMANDS = {
+    "render": ("shipshape_lab.simulator.render", "picture of the simulated vessels beside real hulls"),
+    "data": ("shipshape_lab.simulator.datasets", "make a data set: train, validation, P or H"),
+    "train": ("shipshape_lab.training.train_all", "make the default bundle from nothing"),
+    "bundle": ("shipshape_lab.training.build_bundle", "calibrate trained networks and write their bundle"),
+    "evaluate": ("shipshape_lab.experiments.evaluate_p", "recognition on the paper grid P"),
+    "restoration": ("shipshape_lab.experiments.restoration_p", "restoration on the paper grid P"),
+    "report": ("shipshape_lab.experiments.report", "tables and figures from the results"),
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command; `shipshape-lab COMMAND --help` explains it."""
+    arguments = sys.argv[1:] if argv is None else argv
+    if not arguments or arguments[0] not in COMMANDS:
+        print("usage: shipshape-lab COMMAND [options]; example: shipshape-lab data P --out runs/data\n")
+        print("\n".join(f"  {name:<12} {what}" for name, (_, what) in COMMANDS.items()))
+        return 0 if arguments and arguments[0] in ("-h", "--help") else 2
+    module, _ = COMMANDS[arguments[0]]
+    importlib.import_module(module).main(arguments[1:])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
