@@ -6,25 +6,19 @@ import numpy as np
 from jaxtyping import Float32
 
 from shipshape.onnx_model import OnnxModel
+from shipshape.softmax import softmax
 
 
-def softmax(logits: Float32[np.ndarray, "... classes"]) -> Float32[np.ndarray, "... classes"]:
-    """Probabilities along the last axis."""
-    weights = np.exp(logits - logits.max(axis=-1, keepdims=True))
-    return weights / weights.sum(axis=-1, keepdims=True)
-
-
-def mean_confidence(
-    images: Float32[np.ndarray, "k 5 16 32"], model: OnnxModel, temperature: float = 1.0
-) -> Float32[np.ndarray, " classes"]:
+def mean_confidence(images: Float32[np.ndarray, "k 5 16 32"], model: OnnxModel) -> Float32[np.ndarray, " classes"]:
     """Confidence of each keypoint's SPD2 image, averaged over the keypoints (paper, section 3.3.2)."""
     (logits,) = model.run(images=images)
-    return softmax(logits / np.float32(temperature)).mean(axis=0)
+    confidence: Float32[np.ndarray, " classes"] = softmax(logits).mean(axis=0)
+    return confidence
 
 
 def fuse(
     evidence: Sequence[Float32[np.ndarray, " classes"]], weights: Sequence[float]
 ) -> Float32[np.ndarray, " classes"]:
     """Log-linear pool p ~ prod_i p_i^w_i of several networks' probabilities; weights fitted on validation."""
-    logs = [np.float32(w) * np.log(np.maximum(p, 1e-7)) for p, w in zip(evidence, weights, strict=True)]
-    return softmax(np.sum(logs, axis=0, dtype=np.float32))
+    logs = np.log(np.maximum(np.stack(evidence), np.float32(1e-7)))
+    return softmax(np.asarray(weights, np.float32) @ logs)

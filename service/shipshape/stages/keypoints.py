@@ -24,4 +24,7 @@ class KeypointParams:
 def select_keypoints(points: Float32[np.ndarray, "n 3"], params: KeypointParams) -> Float32[np.ndarray, "k 3"]:
     """The densest points of `points` in any frame, densest first; fewer than the limit if the cloud is small."""
     counts = kernels.count_neighbours(points, params.radius)
-    return points[kernels.select_spread(points, counts, params.spacing, params.limit)]
+    chosen: Float32[np.ndarray, "k 3"] = points[
+        kernels.select_spread(points, counts, params.spacing, params.limit)
+    ]
+    return chosen

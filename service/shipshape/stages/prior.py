@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from shipshape.onnx_model import OnnxModel
+from shipshape.softmax import softmax
 
 
 def estimate_prior(
@@ -15,6 +16,5 @@ def estimate_prior(
 ) -> Float32[np.ndarray, " classes"]:
     """Mean calibrated confidence over the keypoints' SPD2 images; the last class is "unknown"."""
     (logits,) = model.run(images=images)
-    scaled = logits / np.float32(temperature)
-    weights = np.exp(scaled - scaled.max(axis=1, keepdims=True))
-    return (weights / weights.sum(axis=1, keepdims=True)).mean(axis=0, dtype=np.float32)
+    confidence: Float32[np.ndarray, " classes"] = softmax(logits / np.float32(temperature)).mean(axis=0)
+    return confidence
