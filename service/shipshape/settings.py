@@ -57,11 +57,11 @@ class Settings(BaseSettings):
         description="Milliseconds an answer is meant to take; published to callers. Changes no computation.",
     )
     default_timeout_ms: float = Field(
-        1000.0,
+        5000.0,
         gt=0,
         le=3_600_000,
-        description="Milliseconds a request may take when its caller sets no deadline. Generous enough for a "
-        "full queue on few cores; shorter sheds more of the callers that did not say what they need.",
+        description="Milliseconds a request may take when its caller sets no deadline. Long enough that a full "
+        "queue on one core is still answered, and people get their pictures; programs should set their own.",
     )
     drain_s: float = Field(
         10.0,

@@ -12,7 +12,7 @@ LONGEST_MS = 3_600_000.0  # a longer deadline is none: gRPC hands out centuries 
 class Timeouts:
     """Milliseconds."""
 
-    default_ms: float = 1000.0  # a request may take, when its caller sets no deadline
+    default_ms: float = 5000.0  # a request may take, when its caller sets no deadline
     budget_ms: float = 50.0  # an answer is meant to take
 
 
