@@ -96,6 +96,7 @@ class _TensorEntry(_Spec):
     dtype: str
 
     def to_spec(self) -> TensorSpec:
+        """The tensor as the rest of the service knows it."""
         return TensorSpec(self.name, tuple(self.shape), self.dtype)
 
 
@@ -106,6 +107,7 @@ class _ModelEntry(_Spec):
     outputs: list[_TensorEntry]
 
     def to_signature(self) -> Signature:
+        """What goes into the network and comes out, in the order of the file."""
         return Signature(
             inputs=tuple(entry.to_spec() for entry in self.inputs),
             outputs=tuple(entry.to_spec() for entry in self.outputs),
@@ -122,6 +124,7 @@ class _VesselEntry(_Spec):
     height: _Metres
 
     def to_vessel(self) -> CatalogueVessel:
+        """The entry as the rest of the service knows it; metres."""
         return CatalogueVessel(self.name, ReferenceBox(self.length, self.beam, self.height))
 
 

@@ -1,0 +1,1 @@
+"""LiDAR clusters of vessels, with the truth about them."""

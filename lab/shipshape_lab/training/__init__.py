@@ -1,0 +1,1 @@
+"""Simulated clusters in, a verified model bundle out."""

@@ -1,0 +1,1 @@
+"""The stages of the data path: one file each, none sees another; `pipeline` joins them."""
