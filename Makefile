@@ -49,7 +49,7 @@ gen-check: $(VENV)/.dev ## the gRPC stubs are those of proto/
 	done
 
 train: torch ## make the default bundle in the lab: data sets, networks, ONNX, manifest
-	@$(BIN)/python -m shipshape_lab.training
+	@$(BIN)/shipshape-lab train --work runs --to models
 
 torch: $(VENV)/.dev ## add torch, which only the lab and its tests use
 	@$(BIN)/python -c 'import torch' 2>/dev/null || $(PIP) install --requirement requirements/torch.txt

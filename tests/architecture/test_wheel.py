@@ -1,0 +1,73 @@
+import subprocess
+import sys
+import zipfile
+from email.parser import Parser
+from pathlib import Path
+
+import pytest
+
+from architecture.tree import ROOT
+
+# Imports all of the wheel in an interpreter that has none of the lab's packages.
+IMPORT_EVERYTHING = """
+import importlib, pkgutil, sys
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {"torch", "shipshape_lab", "trimesh", "embreex", "matplotlib", "onnx"}:
+            raise ImportError(f"the service asked for {name}")
+sys.meta_path.insert(0, Refuse())
+import shipshape
+assert shipshape.__file__.startswith(sys.argv[1]), shipshape.__file__
+for module in pkgutil.walk_packages(shipshape.__path__, "shipshape."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", folder]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def unpacked(wheel):
+    folder = wheel.with_suffix("")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def test_the_wheel_holds_the_service_alone(unpacked):
+    assert {path.name.partition("-")[0] for path in unpacked.iterdir()} == {"shipshape"}
+    kinds = {path.suffix for path in (unpacked / "shipshape").rglob("*") if path.is_file()}
+    assert kinds == {".py", ".pyi", ".npy", ".md"}
+
+
+def test_the_wheel_asks_for_nothing_of_the_lab(unpacked):
+    (metadata,) = unpacked.glob("*.dist-info/METADATA")
+    needed = Parser().parsestr(metadata.read_text(encoding="utf-8")).get_all("Requires-Dist")
+    assert "onnxruntime" in needed
+    assert not {"torch", "trimesh", "embreex", "onnx", "matplotlib", "shipshape-lab"} & set(needed)
+
+
+def test_every_module_of_the_wheel_imports_without_the_lab(unpacked):
+    _run(["-c", IMPORT_EVERYTHING, str(unpacked)], unpacked)
+
+
+def test_the_wheel_brings_its_sample_cluster(unpacked):
+    _run(["-c", "from shipshape.sample import sample_contact; sample_contact()"], unpacked)
+
+
+def _run(arguments: list[str], packages: Path) -> None:
+    ran = subprocess.run(
+        [sys.executable, *arguments],
+        env={"PYTHONPATH": str(packages), "PATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
