@@ -1,11 +1,9 @@
 """Preset `best`: what measured best; class-free pose, occupancy and height apart, all evidence fused."""
 
-import numpy as np
-
 from shipshape import raster
 from shipshape.bundle import Bundle
+from shipshape.softmax import softmax
 from shipshape.stages import bow_stern, classification, heading, inpainting, lifting, projection
-from shipshape.stages.classification import softmax
 from shipshape.work import Work
 
 
@@ -54,4 +52,4 @@ class BestMethod:
         """Prior, aligned look, bottleneck and restored cloud, weighted as validation says."""
         restored = classification.mean_confidence(work.images, self._models["spd2"])
         evidence = [work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]
-        work.probabilities = classification.fuse(evidence, self._parameters["fusion_weights"]).astype(np.float32)
+        work.probabilities = classification.fuse(evidence, self._parameters["fusion_weights"])

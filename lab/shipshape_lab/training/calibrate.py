@@ -15,8 +15,8 @@ from tqdm import tqdm
 from shipshape import frames, raster
 from shipshape.bundle import Bundle
 from shipshape.pipeline import Pipeline
+from shipshape.softmax import softmax
 from shipshape.stages import bow_stern, classification, keypoints, prior, projection, spd2
-from shipshape.stages.classification import softmax
 from shipshape.stages.keypoints import KeypointParams
 from shipshape.types import ImageMethod, Options, Preset
 from shipshape_lab.training.examples import Example, Examples

@@ -40,6 +40,47 @@ class Drawn(Dataset):
         return self._draw(index, np.random.default_rng([self._seed, self.epoch, index]))
 
 
+class _Run:
+    """A network with its optimiser and rate schedule: what a checkpoint holds."""
+
+    def __init__(self, net: nn.Module, steps: int, rate: float) -> None:
+        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.net = net.to(self.device)
+        self.optimizer = torch.optim.AdamW(net.parameters(), lr=rate, weight_decay=1e-3)
+        self.rates = torch.optim.lr_scheduler.OneCycleLR(
+            self.optimizer, rate, total_steps=max(steps, 2), pct_start=0.15
+        )
+
+    def step(self, batch: Batch, loss_of: Callable[[nn.Module, Batch], Tensor]) -> float:
+        """One step of the optimiser; returns the loss."""
+        on_device = {name: value.to(self.device) for name, value in batch.items()}
+        with torch.autocast(self.device.type, torch.bfloat16):
+            loss = loss_of(self.net, on_device)
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.net.parameters(), 5.0)
+        self.optimizer.step()
+        self.rates.step()
+        return float(loss.detach())
+
+    def resume(self, checkpoint: Path) -> int:
+        """Take up the checkpoint, if there is one; returns the epochs done."""
+        if not checkpoint.exists():
+            return 0
+        state = torch.load(checkpoint, weights_only=True, map_location=self.device)
+        for name in ("net", "optimizer", "rates"):
+            getattr(self, name).load_state_dict(state[name])
+        return int(state["epoch"])
+
+    def keep(self, checkpoint: Path, epoch: int) -> None:
+        """Write the checkpoint; a run that is killed leaves the last whole one."""
+        checkpoint.parent.mkdir(parents=True, exist_ok=True)
+        draft = checkpoint.with_suffix(".part")
+        parts = {name: getattr(self, name).state_dict() for name in ("net", "optimizer", "rates")}
+        torch.save(parts | {"epoch": epoch}, draft)
+        draft.replace(checkpoint)
+
+
 def train(
     net: nn.Module,
     data: Drawn,
@@ -56,71 +97,18 @@ def train(
         schedule: epochs, batch, rate, seed.
         checkpoint: file that the state is kept in after every epoch; a run that was stopped goes on from it.
     """
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    net.to(device)
-    optimizer = torch.optim.AdamW(net.parameters(), lr=schedule.rate, weight_decay=1e-3)
-    steps = schedule.epochs * (len(data) // schedule.batch)
-    rates = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, schedule.rate, total_steps=max(steps, 2), pct_start=0.15
-    )
-    first = _resume(checkpoint, net, optimizer, rates)
-    for epoch in range(first, schedule.epochs):
+    run = _Run(net, schedule.epochs * (len(data) // schedule.batch), schedule.rate)
+    for epoch in range(run.resume(checkpoint), schedule.epochs):
         data.epoch = epoch
-        loader = _loader(data, schedule, epoch)
-        mean = _one_epoch(
-            net.train(),
-            loader,
-            loss_of,
-            optimizer,
-            rates,
-            device,
-            f"{checkpoint.stem} {epoch + 1}/{schedule.epochs}",
-        )
-        log.info("%s epoch %d/%d loss %.4f", checkpoint.stem, epoch + 1, schedule.epochs, mean)
-        _keep(checkpoint, net, optimizer, rates, epoch + 1)
+        net.train()
+        title = f"{checkpoint.stem} {epoch + 1}/{schedule.epochs}"
+        bar = tqdm(_loader(data, schedule, epoch), desc=title, leave=False, mininterval=2.0)
+        losses = [run.step(batch, loss_of) for batch in bar]
+        log.info("%s loss %.4f", title, float(np.mean(losses)))
+        run.keep(checkpoint, epoch + 1)
     return net.cpu().eval()
 
 
 def _loader(data: Drawn, schedule: Schedule, epoch: int) -> DataLoader:
     order = torch.Generator().manual_seed(schedule.seed * 1000 + epoch)
     return DataLoader(data, schedule.batch, shuffle=True, drop_last=True, generator=order)
-
-
-def _one_epoch(net, loader, loss_of, optimizer, rates, device, title) -> float:
-    total = 0.0
-    for batch in tqdm(loader, desc=title, leave=False, mininterval=2.0):
-        batch = {name: value.to(device) for name, value in batch.items()}
-        with torch.autocast(device.type, torch.bfloat16):
-            loss = loss_of(net, batch)
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        nn.utils.clip_grad_norm_(net.parameters(), 5.0)
-        optimizer.step()
-        rates.step()
-        total += float(loss.detach())
-    return total / max(len(loader), 1)
-
-
-def _resume(checkpoint: Path, net, optimizer, rates) -> int:
-    if not checkpoint.exists():
-        return 0
-    state = torch.load(checkpoint, weights_only=True)
-    net.load_state_dict(state["net"])
-    optimizer.load_state_dict(state["optimizer"])
-    rates.load_state_dict(state["rates"])
-    return int(state["epoch"])
-
-
-def _keep(checkpoint: Path, net, optimizer, rates, epoch: int) -> None:
-    checkpoint.parent.mkdir(parents=True, exist_ok=True)
-    draft = checkpoint.with_suffix(".part")
-    torch.save(
-        {
-            "net": net.state_dict(),
-            "optimizer": optimizer.state_dict(),
-            "rates": rates.state_dict(),
-            "epoch": epoch,
-        },
-        draft,
-    )
-    draft.replace(checkpoint)

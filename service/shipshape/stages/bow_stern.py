@@ -11,6 +11,7 @@ from jaxtyping import Float32
 
 from shipshape.alignment import Look
 from shipshape.onnx_model import OnnxModel
+from shipshape.softmax import softmax
 from shipshape.types import Pose
 
 PARTS = ("bow", "middle", "stern")  # thirds of the length
@@ -45,8 +46,7 @@ def by_parts(
         sharpness: log-odds for a unit of `part_votes`, fitted on validation.
     """
     (logits,) = model.run(images=images)
-    weights = np.exp(logits - logits.max(axis=1, keepdims=True))
-    votes = part_votes(points_along, weights / weights.sum(axis=1, keepdims=True), pose.size.length)
+    votes = part_votes(points_along, softmax(logits), pose.size.length)
     return _settle(pose, flip_logit=-sharpness * votes)
 
 
