@@ -3,17 +3,15 @@
     python benchmarks/pipeline.py --bundle models --out runs/results
 
 Ray-cast clusters of one hull from twelve headings, thinned to exactly the number of points, take turns. One
-thread, pinned to one core where the system allows it; run it on an idle machine. Writes OUT/pipeline_ms.json.
+thread on one core. Elapsed times are what counts, so run it on an idle machine; the processor time beside the
+total tells how much of it other programs took. Writes OUT/pipeline_ms.json.
 """
-
-import os
-
-for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[_threads] = "1"  # before numpy and numba start their threads
 
 import argparse
 import json
+import os
 import platform
+import sys
 import time
 from pathlib import Path
 
@@ -35,6 +33,8 @@ HEADINGS_DEG = range(7, 360, 30)
 VESSEL = "patrol_boat"
 RANGES_M = range(200, 9, -5)
 WARM_UP = 24
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+ONE_THREAD = dict.fromkeys(_THREADS, "1")
 
 
 def cluster_of(count: int, heading_deg: int, rng: np.random.Generator) -> np.ndarray:
@@ -56,15 +56,16 @@ def cluster_of(count: int, heading_deg: int, rng: np.random.Generator) -> np.nda
 
 
 def measure(pipeline: Pipeline, contacts: list[Contact], runs: int) -> dict[str, np.ndarray]:
-    """Milliseconds of each stage and of the whole (`total`), one entry a run."""
-    times: dict[str, list[float]] = {"total": []}
+    """Milliseconds of the whole (`total`; `processor`: its processor time) and of each stage, one entry a run."""
+    times: dict[str, list[float]] = {"total": [], "processor": []}
     for turn in range(WARM_UP + runs):
-        started = time.perf_counter()
+        started, busy = time.perf_counter(), time.process_time()
         recognition = pipeline.run(contacts[turn % len(contacts)])
-        total = (time.perf_counter() - started) * 1e3
+        total, processor = (time.perf_counter() - started) * 1e3, (time.process_time() - busy) * 1e3
         if turn < WARM_UP:
             continue
         times["total"].append(total)
+        times["processor"].append(processor)
         for stage, milliseconds in recognition.stage_ms.items():
             times.setdefault(stage, []).append(milliseconds)
     return {name: np.array(values) for name, values in times.items()}
@@ -76,7 +77,7 @@ def summary(times: dict[str, np.ndarray]) -> dict[str, dict]:
         name: {"median": round(float(np.median(ms)), 4), "p95": round(float(np.percentile(ms, 95)), 4)}
         for name, ms in times.items()
     }
-    return {"total": spread.pop("total"), "stages": spread}
+    return {"total": spread.pop("total"), "processor": spread.pop("processor"), "stages": spread}
 
 
 def machine() -> dict[str, object]:
@@ -92,7 +93,7 @@ def machine() -> dict[str, object]:
 
 
 def use_one_core() -> None:
-    """One thread, pinned to the last core this process may use (the first one serves most interrupts)."""
+    """Stay on the last core that this process may use; the first one serves most interrupts."""
     cv2.setNumThreads(1)
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
@@ -101,14 +102,12 @@ def use_one_core() -> None:
 def table(measured: dict[str, dict]) -> str:
     """Median and p95 milliseconds; a row a stage, a column a size."""
     lines = ["median / p95 ms".ljust(18) + "".join(f"{size} points".rjust(18) for size in measured)]
-    rows = [(stage, [timing["stages"][stage] for timing in measured.values()]) for stage in _stages(measured)]
-    for name, cells in [*rows, ("total", [timing["total"] for timing in measured.values()])]:
+    stages = next(iter(measured.values()))["stages"]
+    rows = [(stage, [timing["stages"][stage] for timing in measured.values()]) for stage in stages]
+    sums = [(name, [timing[name] for timing in measured.values()]) for name in ("total", "processor")]
+    for name, cells in [*rows, *sums]:
         lines.append(name.ljust(18) + "".join(f"{ms['median']:9.3f} /{ms['p95']:7.3f}" for ms in cells))
     return "\n".join(lines)
-
-
-def _stages(measured: dict[str, dict]) -> list[str]:
-    return list(next(iter(measured.values()))["stages"])
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -121,7 +120,13 @@ def main(argv: list[str] | None = None) -> None:
         rng = np.random.default_rng([args.seed, size])
         contacts = [Contact(cluster_of(size, heading, rng)) for heading in HEADINGS_DEG]
         measured[str(size)] = summary(measure(pipeline, contacts, args.runs))
-    about = {"machine": machine(), "bundle_digest": bundle.digest, "runs": args.runs, "seed": args.seed}
+    about = {
+        "machine": machine(),
+        "bundle_digest": bundle.digest,
+        "stages": [stage.name for stage in pipeline.stages],
+        "runs": args.runs,
+        "seed": args.seed,
+    }
     args.out.mkdir(parents=True, exist_ok=True)
     content = json.dumps({**about, "points": measured}, indent=2, sort_keys=True)
     (args.out / "pipeline_ms.json").write_text(content + "\n")
@@ -141,4 +146,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
+    if any(os.environ.get(name) != "1" for name in ONE_THREAD):
+        # Libraries read these when they are imported, which has happened by now: start anew.
+        os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **ONE_THREAD})
     main()

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import onnx
 from onnx import TensorProto, helper
+
 from shipshape.bundle import Bundle, CatalogueVessel
 from shipshape.bundle_writer import write_manifest
 from shipshape.types import ImageMethod
-
 from shipshape_lab.simulator.vessels import CATALOGUE
 from shipshape_lab.training.catalogue import reference_boxes
 

@@ -107,7 +107,13 @@ def main(argv: list[str] | None = None) -> None:
 
 def write_about(path: Path, bundle: Bundle, **more: object) -> None:
     """What the results beside `path` were computed with."""
-    about = {"bundle": bundle.name, "bundle_digest": bundle.digest, "training": dict(bundle.training), **more}
+    about = {
+        "bundle": bundle.name,
+        "bundle_digest": bundle.digest,
+        "catalogue": [vessel.name for vessel in bundle.catalogue],
+        "training": dict(bundle.training),
+        **more,
+    }
     path.write_text(json.dumps(about, indent=2, sort_keys=True, default=str) + "\n")
 
 

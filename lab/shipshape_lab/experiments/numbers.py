@@ -3,7 +3,8 @@
 Clusters that the service refused count as wrong in every share; they have no part in medians and means.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,12 +37,13 @@ def slices(range_m: np.ndarray, aspect_deg: np.ndarray) -> dict[str, np.ndarray]
 
 def aspect_names() -> list[str]:
     """Names of the 30-degree slices of aspect, bow-on first."""
-    return [f"aspect_{low}_{high}" for low, high in zip(ASPECT_EDGES, ASPECT_EDGES[1:], strict=False)]
+    return [f"aspect_{low}_{high}" for low, high in pairwise(ASPECT_EDGES)]
 
 
-def of_answers(name: str, truth: Truth, answers: Answers) -> Numbers:
+def of_answers(name: str, truth: Truth, answers: Answers, catalogue: Sequence[str]) -> Numbers:
     """Accuracy, heading, box, calibration and rejection of every system on the set `name`."""
     masks = slices(truth.range_m, truth.aspect_deg)
+    masks |= {vessel: truth.label == label for label, vessel in enumerate(catalogue)}
     found: Numbers = {
         f"{name}.clusters": len(truth.label),
         f"{name}.refused": int((answers.vessel[SYSTEMS.index(BEST)] < 0).sum()),
@@ -106,6 +108,7 @@ def of_pipeline_ms(measured: dict) -> Numbers:
     for points, timing in measured["points"].items():
         found[f"pipeline_ms.best.{points}"] = timing["total"]["median"]
         found[f"pipeline_ms.best.{points}.p95"] = timing["total"]["p95"]
+        found[f"pipeline_ms.best.{points}.processor"] = timing["processor"]["median"]
         for stage, times in timing["stages"].items():
             found[f"pipeline_ms.best.{points}.{stage}"] = times["median"]
     return found
