@@ -43,7 +43,7 @@ def aspect_names() -> list[str]:
 def of_answers(name: str, truth: Truth, answers: Answers, catalogue: Sequence[str]) -> Numbers:
     """Accuracy, heading, box, calibration and rejection of every system on the set `name`."""
     masks = slices(truth.range_m, truth.aspect_deg)
-    masks |= {vessel: truth.label == label for label, vessel in enumerate(catalogue)}
+    masks |= {vessel: truth.label == i for i, vessel in enumerate(catalogue) if i in truth.label}
     found: Numbers = {
         f"{name}.clusters": len(truth.label),
         f"{name}.refused": int((answers.vessel[SYSTEMS.index(BEST)] < 0).sum()),
@@ -115,5 +115,9 @@ def of_pipeline_ms(measured: dict) -> Numbers:
 
 
 def rounded(numbers: Numbers) -> Numbers:
-    """Five significant digits, so that a file of them does not differ by noise of the last bit."""
-    return {key: value if isinstance(value, int) else float(f"{value:.5g}") for key, value in numbers.items()}
+    """Five significant digits, so that noise of the last bit does not show; what is not a number is left out."""
+    return {
+        key: value if isinstance(value, int) else float(f"{value:.5g}")
+        for key, value in numbers.items()
+        if np.isfinite(value)
+    }
