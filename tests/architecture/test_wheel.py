@@ -65,7 +65,7 @@ def test_the_wheel_brings_its_sample_cluster(unpacked):
 def _run(arguments: list[str], packages: Path) -> None:
     ran = subprocess.run(
         [sys.executable, *arguments],
-        env={"PYTHONPATH": str(packages), "PATH": ""},
+        env={"PYTHONPATH": str(packages), "PYTHONDONTWRITEBYTECODE": "1", "PATH": ""},
         capture_output=True,
         text=True,
         check=False,
