@@ -46,8 +46,8 @@ def _accuracy(figure: Figure, numbers: Numbers) -> None:
     left, right = figure.subplots(1, 2, sharey=True)
     for system in SYSTEMS:
         key = f"P.accuracy.{system}."
-        _line(left, _by_distance(numbers, lambda part, key=key: key + part, 100), system, DISTANCES)
-        _line(right, _by_aspect(numbers, lambda part, key=key: key + part, 100), system, _ASPECTS)
+        _line(left, _by_distance(numbers, key, 100), system, DISTANCES)
+        _line(right, _by_aspect(numbers, key, 100), system, _ASPECTS)
     _label(left, "distance, m", "right vessel, %")
     _label(right, "aspect, deg (0 bow-on, 180 stern-on)", "")
     right.legend(fontsize=8)
@@ -57,9 +57,9 @@ def _heading(figure: Figure, numbers: Numbers) -> None:
     left, middle, right = figure.subplots(1, 3)
     for system in ("best", "paper"):
         median, within = f"P.heading.{system}.median_deg.", f"P.heading.{system}.within_5deg."
-        _line(left, _by_distance(numbers, lambda part, key=median: key + part), system, DISTANCES)
-        _line(middle, _by_distance(numbers, lambda part, key=within: key + part, 100), system, DISTANCES)
-        _line(right, _by_aspect(numbers, lambda part, key=within: key + part, 100), system, _ASPECTS)
+        _line(left, _by_distance(numbers, median), system, DISTANCES)
+        _line(middle, _by_distance(numbers, within, 100), system, DISTANCES)
+        _line(right, _by_aspect(numbers, within, 100), system, _ASPECTS)
     left.set_ylim(bottom=0.0)
     _label(left, "distance, m", "median heading error, deg")
     _label(middle, "distance, m", "heading within 5 deg, %")
@@ -72,8 +72,8 @@ def _restoration(figure: Figure, numbers: Numbers) -> None:
     left, right = figure.subplots(1, 2)
     for cloud in _RESTORED:
         chamfer, share = f"P.cd_l1.{cloud}.", f"P.fscore.{cloud}."
-        _line(left, _by_distance(numbers, lambda part, key=chamfer: key + part), cloud, DISTANCES)
-        _line(right, _by_distance(numbers, lambda part, key=share: key + part), cloud, DISTANCES)
+        _line(left, _by_distance(numbers, chamfer), cloud, DISTANCES)
+        _line(right, _by_distance(numbers, share), cloud, DISTANCES)
     left.set_ylim(bottom=0.0)
     right.set_ylim(bottom=0.0)
     _label(left, "distance, m", "CD-L1 x 1000 (lower is better)")
@@ -88,12 +88,12 @@ FIGURES: dict[str, tuple[Callable[[Figure, Numbers], None], str]] = {
 }
 
 
-def _by_distance(numbers: Numbers, key: Callable[[str], str], factor: float = 1.0) -> list[float]:
-    return [factor * numbers.get(key(f"{distance}m"), float("nan")) for distance in DISTANCES]
+def _by_distance(numbers: Numbers, prefix: str, factor: float = 1.0) -> list[float]:
+    return [factor * numbers.get(f"{prefix}{distance}m", float("nan")) for distance in DISTANCES]
 
 
-def _by_aspect(numbers: Numbers, key: Callable[[str], str], factor: float = 1.0) -> list[float]:
-    return [factor * numbers.get(key(name), float("nan")) for name in aspect_names()]
+def _by_aspect(numbers: Numbers, prefix: str, factor: float = 1.0) -> list[float]:
+    return [factor * numbers.get(prefix + name, float("nan")) for name in aspect_names()]
 
 
 def _line(axes: Axes, values: Sequence[float], system: str, places: Sequence[object]) -> None:

@@ -115,9 +115,9 @@ def of_pipeline_ms(measured: dict) -> Numbers:
 
 
 def rounded(numbers: Numbers) -> Numbers:
-    """Five significant digits, so that noise of the last bit does not show; what is not a number is left out."""
+    """Six significant digits, so that noise of the last bit does not show; what is not a number is left out."""
     return {
-        key: value if isinstance(value, int) else float(f"{value:.5g}")
+        key: value if isinstance(value, int) else float(f"{value:.6g}")
         for key, value in numbers.items()
         if np.isfinite(value)
     }

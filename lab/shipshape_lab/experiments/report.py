@@ -74,6 +74,7 @@ def texts(about: dict) -> dict:
         "seed": about["training"].get("seed", "unknown"),
         "machine": machine_text(timing),
         "height": about["sensor_height"],
+        "subsample": "" if about["every"] == 1 else f" (every {about['every']}th)",
         "catalogue": about["catalogue"],
         "restoration_every": about.get("restoration_every", "-"),
         "runs": timing.get("runs", 0),
@@ -114,7 +115,10 @@ def write(results: Path, out: Path) -> None:
 def main(argv: list[str] | None = None) -> None:
     """Command line: collects and writes."""
     args = _parser().parse_args(argv)
-    write(args.results, args.out)
+    try:
+        write(args.results, args.out)
+    except ValueError as error:
+        raise SystemExit(f"report: {error}") from error
     print(f"wrote {args.out / 'results.json'}, {args.out / 'results.md'} and {args.out / 'figures'}")
 
 
