@@ -10,11 +10,11 @@ one layer), the lateral extent of the normalised cube, or the beam. CD-L1 x 1000
 import dataclasses
 
 import numpy as np
+
 from shipshape import raster
 from shipshape.raster import ImageFrame
 from shipshape.stages import projection
 from shipshape.types import ImageMethod, ReferenceBox
-
 from shipshape_lab.metrics import CompleteSurface, chamfer_l1
 from shipshape_lab.simulator.surface import sample_surface
 from shipshape_lab.simulator.vessels import CATALOGUE, build_vessel
