@@ -1,9 +1,11 @@
 import ast
 import re
+import shlex
 
 import pytest
 
 from architecture.tree import GENERATED, ROOT, functions, name, sources, tracked
+from shipshape.cli import build_parser
 
 DOCUMENTS = [path for path in tracked("*.md") if GENERATED not in path.parents]
 ARCHITECTURE = ROOT / "ARCHITECTURE.md"
@@ -34,6 +36,12 @@ def test_make_commands_that_are_named_are_there(document):
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.M))
     named = set(re.findall(r"(?:`|^ *)make ([a-z-]+)", document.read_text(encoding="utf-8"), re.M))
     assert named <= targets
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=name)
+def test_shipshape_commands_that_are_shown_parse(document):
+    for line in re.findall(r"^(?:\.venv/bin/)?shipshape (.+)$", document.read_text(encoding="utf-8"), re.M):
+        build_parser().parse_args(shlex.split(line, comments=True))
 
 
 def test_decisions_are_numbered_without_gaps_and_say_what_was_given_up():
