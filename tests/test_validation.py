@@ -112,3 +112,10 @@ def test_an_own_heading_that_is_no_number_is_refused(heading: float) -> None:
 def test_limits_are_the_callers_to_set() -> None:
     with pytest.raises(Unprocessable, match=r"at least 5000 points"):
         check_contact(contact_of(GOOD), ContactLimits(min_points=5_000))
+
+
+def test_a_cluster_under_the_water_is_refused() -> None:
+    points = np.random.default_rng(0).uniform([20, -3, -4], [28, 3, -3], (50, 3)).astype(np.float32)
+    check_contact(Contact(points, sensor_height=3.5), ContactLimits())
+    with pytest.raises(Unprocessable, match=r"above the water, which is at z = -2 m, got a highest point at z = -3"):
+        check_contact(Contact(points, sensor_height=2.0), ContactLimits())

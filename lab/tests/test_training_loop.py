@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch", reason="training needs torch, which only `make torch` installs")
+pytest.importorskip("torch", reason="training needs torch, which only `make torch` installs")
+
+import torch
 
 from shipshape_lab.training import export, loop
 

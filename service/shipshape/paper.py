@@ -15,6 +15,7 @@ from shipshape.stages import (
     spd2,
 )
 from shipshape.stages.keypoints import KeypointParams
+from shipshape.types import RestoredCloud
 from shipshape.work import Work
 
 
@@ -63,8 +64,11 @@ class PaperMethod:
         )
 
     def lifting(self, work: Work) -> None:
-        """Every filled pixel becomes a point."""
+        """Every filled pixel becomes a point; a cluster that fell outside the image stays as it came."""
         work.restored = lifting.lift_grey(work.before, work.after, work.pose, work.frame)
+        if not len(work.restored.measured):
+            points = work.contact.points_level
+            work.restored = RestoredCloud(points, np.ones(len(points), np.bool_))
 
     def classification(self, work: Work) -> None:
         """Mean confidence of the three densest keypoints; the paper knows no "unknown"."""

@@ -14,7 +14,7 @@ class ContactLimits:
 
     min_points: int = 10  # fewer carry no shape
     max_points: int = 65_536  # bounds the work of one contact
-    max_extent: float = 150.0  # m, horizontally; wider is a scene, not a vessel that was trained on
+    max_extent: float = 150.0  # m, in any direction; wider is a scene, not a vessel that was trained on
     min_extent: float = 0.5  # m, horizontally; smaller is spray or a buoy
     max_range: float = 1_000.0  # m; beyond every marine LiDAR
 
@@ -45,6 +45,12 @@ def _check_numbers(contact: Contact) -> None:
     height = contact.sensor_height
     if height is not None and not 0.0 < height < 200.0:
         raise Unprocessable(f"expected a sensor height between 0 and 200 m above the water, got {height}")
+    top = float(contact.points_level[:, 2].max())
+    if height is not None and top < -height:
+        raise Unprocessable(
+            f"expected points above the water, which is at z = {-height:g} m, "
+            f"got a highest point at z = {top:.2f} m"
+        )
     own = contact.own_true_heading_deg
     if own is not None and not np.isfinite(own):
         raise Unprocessable(f"expected the own true heading in degrees, got {own}")
