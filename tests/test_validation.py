@@ -117,5 +117,6 @@ def test_limits_are_the_callers_to_set() -> None:
 def test_a_cluster_under_the_water_is_refused() -> None:
     points = np.random.default_rng(0).uniform([20, -3, -4], [28, 3, -3], (50, 3)).astype(np.float32)
     check_contact(Contact(points, sensor_height=3.5), ContactLimits())
-    with pytest.raises(Unprocessable, match=r"above the water, which is at z = -2 m, got a highest point at z = -3"):
+    expected = r"above the water, which is at z = -2 m, got a highest point at z = -3"
+    with pytest.raises(Unprocessable, match=expected):
         check_contact(Contact(points, sensor_height=2.0), ContactLimits())
