@@ -55,28 +55,88 @@ def rasterise(
     return count, top, bottom, offset
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _squared_distance(points: Float32[np.ndarray, "n 3"], i: int, j: int) -> np.float32:
+    # By coordinate: a difference of rows would allocate an array for every pair.
+    dx, dy, dz = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+    return np.float32(dx * dx + dy * dy + dz * dz)
+
+
 @njit(cache=True, nogil=True)
 def count_neighbours(points: Float32[np.ndarray, "n 3"], radius: float) -> Int32[np.ndarray, " n"]:
     """How many other points lie within `radius` of each point: n_i = |{j != i: |p_i - p_j| <= r}|.
 
-    Points are swept in order of x, so that only a slab of width `radius` is compared.
+    Points are sorted into cubes a little larger than `radius`. Cubes above one another follow each other, so the
+    neighbours of a point that come after it lie in five runs: its own column, and four of the eight beside it.
     """
-    order = np.argsort(points[:, 0])
-    x, y, z = points[order, 0], points[order, 1], points[order, 2]
+    cubes, start, order = _sort_into_cubes(points, radius)
+    _, deep, high = cubes
+    lined_up = points[order]
     found = np.zeros(len(points), np.int32)
-    limit = np.float32(radius * radius)
-    for i in range(len(points)):
-        for j in range(i + 1, len(points)):
-            dx = x[j] - x[i]
-            if dx > radius:
-                break
-            dy, dz = y[j] - y[i], z[j] - z[i]
-            if dx * dx + dy * dy + dz * dz <= limit:
-                found[i] += 1
-                found[j] += 1
+    limit = np.float32(radius) * np.float32(radius)
+    for cube in range(len(start) - 1):
+        if start[cube] == start[cube + 1]:
+            continue
+        z, y, x = cube % high, cube // high % deep, cube // high // deep
+        for i in range(start[cube], start[cube + 1]):
+            _count_run(lined_up, i, (i + 1, start[cube + (2 if z + 1 < high else 1)]), limit, found)
+        for run in range(4):
+            nx, ny = x + (run > 0), y + (1 if run == 0 else run - 2)
+            if nx < cubes[0] and 0 <= ny < deep:
+                column = (nx * deep + ny) * high
+                span = (start[column + max(z - 1, 0)], start[column + min(z + 2, high)])
+                for i in range(start[cube], start[cube + 1]):
+                    _count_run(lined_up, i, span, limit, found)
     counts = np.empty(len(points), np.int32)
     counts[order] = found
     return counts
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _count_run(
+    points: Float32[np.ndarray, "n 3"],
+    i: int,
+    run: tuple[int, int],
+    limit: np.float32,
+    found: Int32[np.ndarray, " n"],
+) -> None:
+    for j in range(run[0], run[1]):
+        if _squared_distance(points, i, j) <= limit:
+            found[i] += 1
+            found[j] += 1
+
+
+_MOST_CUBES = 1 << 20  # bounds memory; wider clouds get larger cubes
+
+
+@njit(cache=True, nogil=True)
+def _sort_into_cubes(
+    points: Float32[np.ndarray, "n 3"], radius: float
+) -> tuple[tuple[int, int, int], Int32[np.ndarray, " cubes+1"], Int32[np.ndarray, " n"]]:
+    """Cubes along each axis, where each cube's points start in the order, and the points in order of cubes."""
+    lower, extent = np.empty(3, np.float32), np.empty(3, np.float32)
+    for axis in range(3):
+        lower[axis] = points[:, axis].min() if len(points) else 0.0
+        extent[axis] = points[:, axis].max() - lower[axis] if len(points) else 0.0
+    edge = max(1.001 * radius, 1e-6)  # the margin keeps rounding from hiding a neighbour two cubes away
+    while (extent[0] / edge + 1) * (extent[1] / edge + 1) * (extent[2] / edge + 1) > _MOST_CUBES:
+        edge *= 2
+    cubes = (int(extent[0] / edge) + 1, int(extent[1] / edge) + 1, int(extent[2] / edge) + 1)
+    cube = np.empty(len(points), np.int32)
+    start = np.zeros(cubes[0] * cubes[1] * cubes[2] + 1, np.int32)
+    for i in range(len(points)):
+        x = int((points[i, 0] - lower[0]) / edge)
+        y = int((points[i, 1] - lower[1]) / edge)
+        z = int((points[i, 2] - lower[2]) / edge)
+        cube[i] = (x * cubes[1] + y) * cubes[2] + z
+        start[cube[i] + 1] += 1
+    for k in range(1, len(start)):
+        start[k] += start[k - 1]
+    order, free = np.empty(len(points), np.int32), start.copy()
+    for i in range(len(points)):
+        order[free[cube[i]]] = i
+        free[cube[i]] += 1
+    return cubes, start, order
 
 
 @njit(cache=True, nogil=True)
@@ -100,8 +160,7 @@ def select_spread(
         chosen[taken] = best
         taken += 1
         for i in range(len(points)):
-            dx, dy, dz = points[i] - points[best]
-            if dx * dx + dy * dy + dz * dz < spacing * spacing:
+            if _squared_distance(points, i, best) < spacing * spacing:
                 free[i] = False
         free[best] = False
     return chosen[:taken]
@@ -146,7 +205,7 @@ def bin_spherically(
     nearest = np.zeros((rows, columns), np.float32)
     farthest = np.zeros((rows, columns), np.float32)
     for i in range(len(points)):
-        dx, dy, dz = points[i] - centre
+        dx, dy, dz = points[i, 0] - centre[0], points[i, 1] - centre[1], points[i, 2] - centre[2]
         distance = np.sqrt(dx * dx + dy * dy + dz * dz)
         if distance == 0.0 or distance >= radius:
             continue
@@ -188,7 +247,8 @@ def lift_columns(
                 for column in range(columns):
                     if not occupied[layer, row, column]:
                         continue
-                    top, bottom, seen_top, seen_bottom = bounds[:, layer, row, column]
+                    top, bottom = bounds[0, layer, row, column], bounds[1, layer, row, column]
+                    seen_top, seen_bottom = bounds[2, layer, row, column], bounds[3, layer, row, column]
                     levels = 1 + max(0, int(np.ceil((top - bottom) / step - 0.5)))
                     for level in range(levels):
                         depth = bottom + (top - bottom) * (level + 0.5) / levels
