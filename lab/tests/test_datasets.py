@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 
 from shipshape_lab.simulator import datasets, recipes
+from shipshape_lab.simulator.catalogue import DEFAULT
 from shipshape_lab.simulator.clusters import load, load_surfaces
-from shipshape_lab.simulator.datasets import CLASSES, Job, grid_hull, main, make
+from shipshape_lab.simulator.datasets import Job, grid_hull, main, make
 from shipshape_lab.simulator.recipes import GRID_DISTANCES, GRID_HEADINGS_DEG, RECIPES
-from shipshape_lab.simulator.vessels import CATALOGUE, VESSEL_TYPES
+from shipshape_lab.simulator.vessels import VESSEL_TYPES
 
 
 @pytest.fixture(scope="module")
@@ -28,11 +29,11 @@ def test_hull_seeds_of_the_splits_are_disjoint():
     assert set(RECIPES["train"].hulls) == splits[0]
     assert set(RECIPES["validation"].hulls) == splits[1]
     assert set(RECIPES["H"].hulls) == splits[2]
-    assert {grid_hull(*cell) for cell in recipes.grid_cells(CATALOGUE)} == splits[2]
+    assert {grid_hull(*cell) for cell in recipes.grid_cells(DEFAULT.names)} == splits[2]
 
 
 def test_seeds_of_the_sets_differ():
-    assert len(set(datasets.SEEDS.values())) == len(datasets.COUNTS)
+    assert len(set(datasets.SEEDS.values())) == len(datasets.SEEDS) == 4
 
 
 @pytest.mark.parametrize("name", RECIPES)
@@ -58,8 +59,8 @@ def test_a_quarter_of_training_ranges_is_far():
 
 
 def test_classes_are_the_catalogue_then_the_others():
-    assert CLASSES[:5] == CATALOGUE
-    assert sorted(CLASSES) == sorted(VESSEL_TYPES)
+    assert DEFAULT.classes[:5] == DEFAULT.names
+    assert sorted(DEFAULT.classes) == sorted(VESSEL_TYPES)
 
 
 def test_clusters_are_consistent_with_their_truth(train):
@@ -82,8 +83,8 @@ def test_clusters_are_consistent_with_their_truth(train):
 
 def test_a_quarter_lies_outside_the_catalogue():
     rngs = [Job("train", 0, 1).rng(i) for i in range(2000)]
-    drawn = [datasets._draw_type(RECIPES["train"], rng) for rng in rngs]
-    assert np.mean([name not in CATALOGUE for name in drawn]) == pytest.approx(0.25, abs=0.03)
+    drawn = [datasets._draw_class(RECIPES["train"], DEFAULT, rng) for rng in rngs]
+    assert np.mean([name not in DEFAULT.names for name in drawn]) == pytest.approx(0.25, abs=0.03)
     assert set(drawn) == set(VESSEL_TYPES)
 
 
@@ -94,11 +95,11 @@ def test_a_set_does_not_depend_on_how_many_clusters_or_processes_share_it(train)
 
 
 def test_the_paper_grid_is_whole_and_in_order():
-    cells = recipes.grid_cells(CATALOGUE)
-    assert len(cells) == len(set(cells)) == datasets.COUNTS["P"] == 16_200
-    assert cells[0] == (CATALOGUE[0], 30, 0)
-    assert cells[361] == (CATALOGUE[0], 40, 1)
-    assert cells[-1] == (CATALOGUE[-1], 110, 359)
+    cells = recipes.grid_cells(DEFAULT.names)
+    assert len(cells) == len(set(cells)) == 16_200
+    assert cells[0] == (DEFAULT.names[0], 30, 0)
+    assert cells[361] == (DEFAULT.names[0], 40, 1)
+    assert cells[-1] == (DEFAULT.names[-1], 110, 359)
 
 
 def test_grid_clusters_carry_their_cell():

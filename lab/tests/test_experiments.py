@@ -29,10 +29,10 @@ def data(tmp_path_factory):
     scans = [datasets.grid_cluster(job, cell) for cell in CELLS]
     thin, sensor = scans[0]
     scans.append((thin.__class__(**{**vars(thin), "points_level": thin.points_level[:4]}), sensor))
-    clusters = collect(scans, datasets.CLASSES, job.seed)
+    clusters = collect(scans, job.catalogue, job.seed)
     save(folder / "P.npz", clusters)
     pairs = sorted(set(zip(clusters.label.tolist(), clusters.hull_seed.tolist(), strict=True)))
-    hulls = [(datasets.CLASSES[label], seed) for label, seed in pairs]
+    hulls = [(job.catalogue.classes[label], seed) for label, seed in pairs]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(datasets, "SURFACE_POINTS", 6_000)
         save(folder / "P_surfaces.npz", datasets.make_surfaces(hulls, progress=False))

@@ -13,7 +13,7 @@ from shipshape.raster import FilledLayers
 from shipshape.stages import heading, lifting, projection
 from shipshape_lab.metrics import CompleteSurface, chamfer_l1
 from shipshape_lab.simulator import datasets
-from shipshape_lab.simulator.datasets import CLASSES, Job
+from shipshape_lab.simulator.datasets import Job
 from shipshape_lab.training import train_aligned, train_inpainting, train_sight
 from shipshape_lab.training.examples import Examples, mirrored
 from shipshape_lab.training.poses import disturbed
@@ -32,7 +32,7 @@ class Answers(OnnxModel):
 @pytest.fixture(scope="module")
 def examples():
     clusters = datasets.make(Job("train", 12, 7), progress=False)
-    hulls = {(CLASSES[label], int(seed)) for label, seed in zip(clusters.label, clusters.hull_seed, strict=True)}
+    hulls = {(clusters.name(i), int(clusters.hull_seed[i])) for i in range(len(clusters))}
     return Examples(clusters, datasets.make_surfaces(sorted(hulls), progress=False))
 
 

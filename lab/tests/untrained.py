@@ -6,11 +6,10 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper
 
-from shipshape.bundle import Bundle, CatalogueVessel
+from shipshape.bundle import Bundle
 from shipshape.bundle_writer import write_manifest
 from shipshape.types import ImageMethod
-from shipshape_lab.simulator.vessels import CATALOGUE
-from shipshape_lab.training.catalogue import reference_boxes
+from shipshape_lab.simulator.catalogue import DEFAULT
 
 SPD2 = {"images": (5, 16, 32)}
 LOOK = {"planes": (9, 32, 64), "features": (3,)}
@@ -39,12 +38,11 @@ def write_untrained(folder: Path) -> Bundle:
     for name, (inputs, outputs) in _networks().items():
         models[name] = folder / f"{name}.onnx"
         models[name].write_bytes(_constant_onnx(inputs, outputs))
-    boxes = zip(CATALOGUE, reference_boxes(CATALOGUE), strict=True)
     return write_manifest(
         folder,
         name="untrained",
         training={"commit": "0" * 40, "seed": 1},
-        catalogue=[CatalogueVessel(name, box) for name, box in boxes],
+        catalogue=DEFAULT.vessels(),
         models=models,
         parameters=PARAMETERS,
         scores={},
@@ -52,7 +50,7 @@ def write_untrained(folder: Path) -> Bundle:
 
 
 def _networks() -> dict:
-    logits = np.linspace(2.0, 0.0, len(CATALOGUE) + 1)
+    logits = np.linspace(2.0, 0.0, len(DEFAULT.names) + 1)
     parts = {"logits": np.array([1.0, 0.0, 0.0])}
     occupancy = np.zeros((3, 32, 64))
     occupancy[:2, 10:22, 6:58] = 1.0

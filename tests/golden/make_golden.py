@@ -55,15 +55,15 @@ def answer(recognition: Recognition) -> dict[str, Any]:
 def make_clusters() -> None:
     """Scan the hulls; needs the lab."""
     from shipshape_lab.simulator import recipes  # noqa: PLC0415  the test reads this file without the lab
+    from shipshape_lab.simulator.catalogue import DEFAULT  # noqa: PLC0415
     from shipshape_lab.simulator.datasets import hull  # noqa: PLC0415
     from shipshape_lab.simulator.scan import Conditions, scan_vessel  # noqa: PLC0415
     from shipshape_lab.simulator.sea import LIGHT_SEA  # noqa: PLC0415
     from shipshape_lab.simulator.sensor import DEFAULT_LIDAR  # noqa: PLC0415
-    from shipshape_lab.simulator.vessels import CATALOGUE  # noqa: PLC0415
 
     rng = np.random.default_rng(SEED)
     scans = []
-    for name in CATALOGUE:
+    for name in DEFAULT.names:
         for band in RANGES:
             vessel, points = hull(name, int(rng.choice(recipes.TEST_HULLS))), np.zeros((0, 3))
             while len(points) < FEWEST_POINTS:

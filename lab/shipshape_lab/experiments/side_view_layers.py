@@ -16,9 +16,8 @@ from shipshape.raster import ImageFrame
 from shipshape.stages import projection
 from shipshape.types import ImageMethod, ReferenceBox
 from shipshape_lab.metrics import CompleteSurface, chamfer_l1
+from shipshape_lab.simulator.catalogue import DEFAULT
 from shipshape_lab.simulator.surface import sample_surface
-from shipshape_lab.simulator.vessels import CATALOGUE, build_vessel
-from shipshape_lab.training.catalogue import reference_boxes
 
 POINTS = 8192
 
@@ -41,13 +40,13 @@ def lifted(surface: np.ndarray, frame: ImageFrame) -> np.ndarray:
 
 def main(argv: list[str] | None = None) -> None:
     """Print the table."""
-    boxes = reference_boxes(CATALOGUE)
+    boxes = DEFAULT.boxes()
     longest = max(box.length for box in boxes)
     print(f"{'method':<10} {'vessel':<14} {'height':>8} {'cube':>8} {'beam':>8}   (CD-L1 x 1000)")
     for method in (ImageMethod.FULL_SIDE, ImageMethod.Z_SIDE):
         rows = []
-        for name, box in zip(CATALOGUE, boxes, strict=True):
-            surface = sample_surface(build_vessel(name), POINTS, np.random.default_rng(1))
+        for name, box in zip(DEFAULT.names, boxes, strict=True):
+            surface = sample_surface(DEFAULT.build(name), POINTS, np.random.default_rng(1))
             truth = CompleteSurface(surface, float(np.ptp(surface, axis=0).max()))
             frames = candidates(method, box, longest).values()
             rows.append([1000 * chamfer_l1(truth.nearest(lifted(surface, frame))) for frame in frames])

@@ -5,17 +5,28 @@ A cluster set holds M clusters one behind the other in `points`; `n` says how ma
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
+from shipshape.bundle import CatalogueVessel
+from shipshape.types import ReferenceBox
+from shipshape_lab.simulator.catalogue import DEFAULT, Catalogue
 from shipshape_lab.simulator.scan import Scan
 
 NOMINAL_SEED = -1
 
 Kind = TypeVar("Kind")
+
+
+def _names(catalogue: Catalogue = DEFAULT) -> np.ndarray:
+    return np.array(catalogue.names)
+
+
+def _boxes(catalogue: Catalogue = DEFAULT) -> np.ndarray:
+    return np.array([(box.length, box.beam, box.height) for box in catalogue.boxes()])
 
 
 @dataclass(frozen=True)
@@ -26,7 +37,7 @@ class ClusterSet:
         points: all clusters' points, shape (sum of n, 3), float32.
         n: points of each cluster, shape (M,), int32.
         label: index into `classes`, shape (M,), int32.
-        classes: type names, unicode.
+        classes: type names, those of the catalogue first, unicode.
         heading: yaw of the vessel, counter-clockwise, shape (M,), float64.
         range_m: horizontal distance to the vessel's origin, shape (M,), float64.
         bearing: direction of the vessel's origin, shape (M,), float64.
@@ -36,6 +47,8 @@ class ClusterSet:
         T_level_vessel: pose of the vessel, shape (M, 4, 4), float64.
         lidar: name of the sensor, unicode, shape (M,).
         seed: seed of the whole set, a scalar.
+        catalogue: names of the K vessels to be known, unicode; the default ones if the file does not say.
+        boxes: length, beam and air height of their nominal hulls, shape (K, 3), float64.
     """
 
     points: np.ndarray
@@ -51,6 +64,8 @@ class ClusterSet:
     T_level_vessel: np.ndarray
     lidar: np.ndarray
     seed: np.ndarray
+    catalogue: np.ndarray = field(default_factory=_names)
+    boxes: np.ndarray = field(default_factory=_boxes)
     starts: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -68,6 +83,11 @@ class ClusterSet:
         """Type name of cluster i."""
         return str(self.classes[self.label[i]])
 
+    @property
+    def vessels(self) -> tuple[CatalogueVessel, ...]:
+        """The catalogue that the set was made from."""
+        return _vessels(self.catalogue, self.boxes)
+
 
 @dataclass(frozen=True)
 class Surfaces:
@@ -82,15 +102,15 @@ class Surfaces:
         return {(str(n), int(s)): i for i, (n, s) in enumerate(zip(self.name, self.hull_seed, strict=True))}
 
 
-def collect(scans: Sequence[tuple[Scan, str]], classes: Sequence[str], seed: int) -> ClusterSet:
-    """Packs scans, each with the name of its sensor, into one set; `classes` fixes the labels."""
+def collect(scans: Sequence[tuple[Scan, str]], catalogue: Catalogue, seed: int) -> ClusterSet:
+    """Packs scans, each with the name of its sensor, into one set; the catalogue's classes fix the labels."""
     found = [scan for scan, _ in scans]
     seeds = [NOMINAL_SEED if scan.vessel_seed is None else scan.vessel_seed for scan in found]
     return ClusterSet(
         points=np.concatenate([np.zeros((0, 3), np.float32), *(scan.points_level for scan in found)]),
         n=np.array([len(scan.points_level) for scan in found], np.int32),
-        label=np.array([list(classes).index(scan.vessel_name) for scan in found], np.int32),
-        classes=np.array(classes),
+        label=np.array([catalogue.classes.index(scan.vessel_name) for scan in found], np.int32),
+        classes=np.array(catalogue.classes),
         heading=np.array([scan.heading for scan in found]),
         range_m=np.array([scan.range_m for scan in found]),
         bearing=np.array([scan.bearing for scan in found]),
@@ -100,6 +120,8 @@ def collect(scans: Sequence[tuple[Scan, str]], classes: Sequence[str], seed: int
         T_level_vessel=np.array([scan.T_level_vessel for scan in found]).reshape(-1, 4, 4),
         lidar=np.array([name for _, name in scans], dtype="U16"),
         seed=np.array(seed, np.int64),
+        catalogue=_names(catalogue),
+        boxes=_boxes(catalogue),
     )
 
 
@@ -120,6 +142,18 @@ def load(path: str | Path) -> ClusterSet:
     return _read(ClusterSet, path)
 
 
+def load_catalogue(path: Path) -> tuple[CatalogueVessel, ...]:
+    """The catalogue of a cluster set, without reading its clusters."""
+    with np.load(path, allow_pickle=False) as arrays:
+        if "catalogue" not in arrays:
+            return DEFAULT.vessels()
+        return _vessels(arrays["catalogue"], arrays["boxes"])
+
+
+def _vessels(names: np.ndarray, boxes: np.ndarray) -> tuple[CatalogueVessel, ...]:
+    return tuple(CatalogueVessel(str(n), ReferenceBox(*map(float, b))) for n, b in zip(names, boxes, strict=True))
+
+
 def load_surfaces(path: str | Path) -> Surfaces:
     """Reads complete surfaces.
 
@@ -130,9 +164,9 @@ def load_surfaces(path: str | Path) -> Surfaces:
 
 
 def _read(kind: type[Kind], path: str | Path) -> Kind:
-    names = [f.name for f in fields(kind) if f.init]
+    wanted = [f for f in fields(kind) if f.init]
     with np.load(path, allow_pickle=False) as arrays:
-        missing = sorted(set(names) - set(arrays.files))
+        missing = sorted(f.name for f in wanted if f.name not in arrays and f.default_factory is MISSING)
         if missing:
             raise ValueError(f"{path} must hold the arrays of a {kind.__name__}, but lacks {missing}")
-        return kind(**{name: arrays[name] for name in names})
+        return kind(**{f.name: arrays[f.name] for f in wanted if f.name in arrays})

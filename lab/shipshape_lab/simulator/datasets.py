@@ -19,38 +19,38 @@ import numpy as np
 from tqdm import tqdm
 
 from shipshape_lab.simulator import recipes
+from shipshape_lab.simulator.catalogue import DEFAULT, Catalogue, read_catalogue, same_vessels
 from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, collect, load, load_surfaces, save
 from shipshape_lab.simulator.scan import Scan, scan_vessel
 from shipshape_lab.simulator.sensor import DEFAULT_LIDAR
 from shipshape_lab.simulator.skirt import with_skirt
 from shipshape_lab.simulator.surface import sample_surface
 from shipshape_lab.simulator.vessel import Vessel
-from shipshape_lab.simulator.vessels import CATALOGUE, VESSEL_TYPES, build_vessel
 
-__all__ = ["CLASSES", "Job", "load", "load_surfaces", "main", "make", "make_surfaces"]
+__all__ = ["Job", "load", "load_surfaces", "main", "make", "make_surfaces"]
 
-CLASSES = (*CATALOGUE, *(name for name in VESSEL_TYPES if name not in CATALOGUE))
 MIN_POINTS = 10
 MAX_DRAWS = 1000
 DRAWS_OF_A_BAND = 50
 SURFACE_POINTS = 20_000
-COUNTS = {"train": 20_000, "validation": 4_000, "H": 5_000, "P": len(recipes.grid_cells(CATALOGUE))}
+COUNTS = {"train": 20_000, "validation": 4_000, "H": 5_000}  # the grid P has as many as it has cells
 SEEDS = {"train": 1, "validation": 2, "P": 3, "H": 4}
 
 
 @cache
-def hull(name: str, seed: int) -> Vessel:
+def hull(name: str, seed: int, catalogue: Catalogue = DEFAULT) -> Vessel:
     """A hull as the scanner wants it, built once in each process."""
-    return with_skirt(build_vessel(name, seed))
+    return with_skirt(catalogue.build(name, seed))
 
 
 @dataclass(frozen=True)
 class Job:
-    """One set to make: its name, how many clusters, and the seed behind all of its chance."""
+    """One set to make: its name, how many clusters, the seed behind all of its chance, and whose clusters."""
 
     name: str
     count: int
     seed: int
+    catalogue: Catalogue = DEFAULT
 
     def rng(self, i: int) -> np.random.Generator:
         """The random stream of cluster i alone."""
@@ -60,12 +60,12 @@ class Job:
 def random_cluster(job: Job, i: int) -> tuple[Scan, str]:
     """Cluster i of a random set; the type stays, all else is drawn again until there are enough points."""
     recipe, rng = recipes.RECIPES[job.name], job.rng(i)
-    name = _draw_type(recipe, rng)
+    name = _draw_class(recipe, job.catalogue, rng)
     for draw in range(MAX_DRAWS):
         # Else far bands would empty towards near ones; but a small craft may never show enough far off.
         if draw % DRAWS_OF_A_BAND == 0:
             band = recipes.draw_band(recipe, rng)
-        vessel = hull(name, int(rng.choice(recipe.hulls)))
+        vessel = hull(name, int(rng.choice(recipe.hulls)), job.catalogue)
         lidar, placement = recipes.draw_lidar(rng), recipes.draw_placement(band, rng)
         conditions = recipes.draw_conditions(recipe, placement, vessel.box[0], rng)
         scan = scan_vessel(vessel, lidar, placement=placement, conditions=conditions, rng=rng)
@@ -74,15 +74,15 @@ def random_cluster(job: Job, i: int) -> tuple[Scan, str]:
     raise ValueError(f"a {name} must show {MIN_POINTS} points within {MAX_DRAWS} draws, but never did")
 
 
-def _draw_type(recipe: recipes.Recipe, rng: np.random.Generator) -> str:
+def _draw_class(recipe: recipes.Recipe, catalogue: Catalogue, rng: np.random.Generator) -> str:
     listed = rng.random() < recipe.catalogue_share
-    return str(rng.choice(CATALOGUE if listed else CLASSES[len(CATALOGUE) :]))
+    return str(rng.choice(catalogue.names if listed else catalogue.others))
 
 
 def grid_cluster(job: Job, i: int) -> tuple[Scan, str]:
     """Cell i of the paper grid, however few its points."""
-    name, distance, heading_deg = recipes.grid_cells(CATALOGUE)[i]
-    vessel = hull(name, grid_hull(name, distance, heading_deg))
+    name, distance, heading_deg = recipes.grid_cells(job.catalogue.names)[i]
+    vessel = hull(name, grid_hull(name, distance, heading_deg), job.catalogue)
     placement = recipes.grid_placement(distance, heading_deg)
     return scan_vessel(vessel, DEFAULT_LIDAR, placement=placement, rng=job.rng(i)), DEFAULT_LIDAR.name
 
@@ -105,21 +105,28 @@ def make(job: Job, *, jobs: int = 1, progress: bool = True) -> ClusterSet:
         The set, clusters in order.
     """
     cluster = partial(grid_cluster if job.name == "P" else random_cluster, job)
-    return collect(_spread(cluster, range(job.count), jobs, job.name if progress else None), CLASSES, job.seed)
+    scans = _spread(cluster, range(job.count), jobs, job.name if progress else None)
+    return collect(scans, job.catalogue, job.seed)
 
 
-def make_surfaces(hulls: Iterable[tuple[str, int]], *, jobs: int = 1, progress: bool = True) -> Surfaces:
-    """Samples the complete outer surface of each hull, (type name, seed)."""
+def make_surfaces(
+    hulls: Iterable[tuple[str, int]],
+    catalogue: Catalogue = DEFAULT,
+    *,
+    jobs: int = 1,
+    progress: bool = True,
+) -> Surfaces:
+    """Samples the complete outer surface of each hull, (class name, seed)."""
     keys = list(hulls)
-    points = _spread(_surface, keys, jobs, "surfaces" if progress else None)
+    points = _spread(partial(_surface, catalogue), keys, jobs, "surfaces" if progress else None)
     names, seeds = zip(*keys, strict=True)
     return Surfaces(np.array(names), np.array(seeds, np.int64), np.stack(points))
 
 
-def _surface(key: tuple[str, int]) -> np.ndarray:
+def _surface(catalogue: Catalogue, key: tuple[str, int]) -> np.ndarray:
     name, seed = key
-    rng = np.random.default_rng([CLASSES.index(name), seed])
-    return sample_surface(build_vessel(name, seed), SURFACE_POINTS, rng)
+    rng = np.random.default_rng([catalogue.classes.index(name), seed])
+    return sample_surface(catalogue.build(name, seed), SURFACE_POINTS, rng)
 
 
 def _spread(function: Callable, items: Sequence, jobs: int, title: str | None) -> list:
@@ -147,24 +154,40 @@ def summary(clusters: ClusterSet) -> str:
 
 def main(argv: list[str] | None = None) -> None:
     """Command line: makes one set and its surfaces, unless they are there."""
-    args = _parser().parse_args(argv)
-    job = Job(args.set, args.count or COUNTS[args.set], SEEDS[args.set] if args.seed is None else args.seed)
-    path, surfaces = args.out / f"{job.name}.npz", args.out / f"{job.name}_surfaces.npz"
-    clusters = None if args.force else _made(job, path)
+    parser = _parser()
+    args = parser.parse_args(argv)
+    path = args.out / f"{args.set}.npz"
+    try:
+        job = _job(args)
+        clusters = None if args.force else _made(job, path)
+    except ValueError as error:
+        parser.error(str(error))
+    surfaces = args.out / f"{job.name}_surfaces.npz"
     if clusters is None:
         surfaces.unlink(missing_ok=True)
         clusters = make(job, jobs=args.jobs)
         save(path, clusters)
     if not surfaces.exists():
         pairs = set(zip(clusters.label.tolist(), clusters.hull_seed.tolist(), strict=True))
-        save(surfaces, make_surfaces([(CLASSES[label], seed) for label, seed in sorted(pairs)], jobs=args.jobs))
+        hulls = [(job.catalogue.classes[label], seed) for label, seed in sorted(pairs)]
+        save(surfaces, make_surfaces(hulls, job.catalogue, jobs=args.jobs))
     print(f"{path}\n{summary(clusters)}")
+
+
+def _job(args: argparse.Namespace) -> Job:
+    catalogue = read_catalogue(args.catalogue) if args.catalogue else DEFAULT
+    catalogue.boxes()  # reads every mesh, so that one that cannot be used is told before the work starts
+    count = args.count or COUNTS.get(args.set) or len(recipes.grid_cells(catalogue.names))
+    return Job(args.set, count, SEEDS[args.set] if args.seed is None else args.seed, catalogue)
 
 
 def _made(job: Job, path: Path) -> ClusterSet | None:
     if not path.exists():
         return None
     clusters = load(path)
+    if not same_vessels(clusters.vessels, job.catalogue.vessels()):
+        own = ", ".join(clusters.catalogue)
+        raise ValueError(f"{path} must be of the catalogue asked for, but is of {own}: name it, or use --force")
     return clusters if (len(clusters), int(clusters.seed)) == (job.count, job.seed) else None
 
 
@@ -174,8 +197,9 @@ def _parser() -> argparse.ArgumentParser:
         description="Makes a data set of simulated clusters (NAME.npz) and its hulls' complete surfaces.",
         epilog="example: python -m shipshape_lab.simulator.datasets train --out runs/data --seed 1 --jobs 2",
     )
-    parser.add_argument("set", choices=sorted(COUNTS), help="train, validation, H (hard test) or P (paper grid)")
+    parser.add_argument("set", choices=sorted(SEEDS), help="train, validation, H (hard test) or P (paper grid)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--catalogue", type=Path, help="TOML file of the vessels to know (default: five types)")
     parser.add_argument("--count", type=int, help="clusters to make; the first ones of the grid for P")
     parser.add_argument("--seed", type=int, help="seed of the set's chance")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")

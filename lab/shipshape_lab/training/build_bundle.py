@@ -10,15 +10,25 @@ from pathlib import Path
 
 from shipshape.bundle import Bundle
 from shipshape.bundle_writer import write_manifest
+from shipshape_lab.simulator.catalogue import same_vessels
+from shipshape_lab.simulator.clusters import load_catalogue
 from shipshape_lab.training.calibrate import calibrated
 from shipshape_lab.training.examples import Examples
-from shipshape_lab.training.partial import catalogue_vessels, partial_bundle
+from shipshape_lab.training.partial import partial_bundle
 
 
 def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
-    """The finished bundle in the folder `to`, read back and verified."""
+    """The finished bundle in the folder `to`, read back and verified.
+
+    Raises:
+        ValueError: the networks were trained for another catalogue than the validation set's.
+    """
     validation = Examples.read(data, "validation")
-    parameters = calibrated(partial_bundle(networks), validation, seed=seed)
+    trained = load_catalogue(data / "train.npz")
+    if not same_vessels(trained, validation.catalogue):
+        names = (", ".join(vessel.name for vessel in vessels) for vessels in (trained, validation.catalogue))
+        raise ValueError("{} must hold one catalogue, but train has {} and validation {}".format(data, *names))
+    parameters = calibrated(partial_bundle(networks, validation.catalogue), validation, seed=seed)
     to.mkdir(parents=True, exist_ok=True)
     files = sorted(networks.glob("*.onnx"))
     for file in files:
@@ -27,7 +37,7 @@ def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
         to,
         name="default",
         training={"commit": _commit(), "seed": seed, "validation_clusters": len(validation)},
-        catalogue=catalogue_vessels(),
+        catalogue=validation.catalogue,
         models={file.stem: Path(file.name) for file in files},
         parameters=parameters,
         scores={},

@@ -11,7 +11,6 @@ import numpy as np
 
 from shipshape.types import Contact, Pose, ReferenceBox
 from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, load, load_surfaces
-from shipshape_lab.simulator.vessels import CATALOGUE
 
 MIN_POINTS = 10
 _MIRROR = np.array([1.0, -1.0, 1.0])
@@ -36,12 +35,11 @@ class Examples:
         self._boxes = np.concatenate(
             [np.ptp(surfaces.points[:, :, :2], axis=1), surfaces.points[:, :, 2:].max(axis=1)], axis=1
         )
-        self.labels = np.minimum(
-            [CATALOGUE.index(name) if name in CATALOGUE else len(CATALOGUE) for name in clusters.classes],
-            len(CATALOGUE),
-        )[clusters.label]
+        self.catalogue = clusters.vessels
+        # The catalogue's names come first among the classes; all others are one, "unknown".
+        self.labels = np.minimum(clusters.label, len(self.catalogue))
         usable = clusters.n >= MIN_POINTS
-        self.indices = np.flatnonzero(usable & (self.labels < len(CATALOGUE)) if catalogue_only else usable)
+        self.indices = np.flatnonzero(usable & (self.labels < len(self.catalogue)) if catalogue_only else usable)
 
     @classmethod
     def read(cls, folder: Path, name: str, *, catalogue_only: bool = False) -> "Examples":
@@ -51,6 +49,11 @@ class Examples:
 
     def __len__(self) -> int:
         return len(self.indices)
+
+    @property
+    def boxes(self) -> list[ReferenceBox]:
+        """Reference boxes of the catalogue, metres."""
+        return [vessel.box for vessel in self.catalogue]
 
     def example(self, i: int) -> Example:
         """Cluster i of the set as it was scanned, sensor height known."""

@@ -4,6 +4,7 @@ Later networks are trained on what the earlier stages of the service make of the
 the service's own pipeline, stopped where its networks end.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from shipshape.bundle import Bundle, CatalogueVessel
@@ -11,8 +12,6 @@ from shipshape.onnx_model import OnnxModel
 from shipshape.pipeline import Pipeline
 from shipshape.types import Contact, Options
 from shipshape.work import Work
-from shipshape_lab.simulator.vessels import CATALOGUE
-from shipshape_lab.training.catalogue import reference_boxes
 
 UNCALIBRATED = {
     "common": {"spd2_radius": 8.0, "prior_temperature": 1.0, "unknown_above": 0.5},
@@ -26,16 +25,10 @@ UNCALIBRATED = {
 }
 
 
-def catalogue_vessels() -> tuple[CatalogueVessel, ...]:
-    """The default catalogue with the reference boxes of its nominal hulls."""
-    pairs = zip(CATALOGUE, reference_boxes(CATALOGUE), strict=True)
-    return tuple(CatalogueVessel(name, box) for name, box in pairs)
-
-
-def partial_bundle(folder: Path, parameters: dict = UNCALIBRATED) -> Bundle:
+def partial_bundle(folder: Path, catalogue: Sequence[CatalogueVessel], parameters: dict = UNCALIBRATED) -> Bundle:
     """The networks in `folder` as a bundle, whichever exist."""
     models = {path.stem: OnnxModel(path) for path in sorted(folder.glob("*.onnx"))}
-    return Bundle("partial", "", catalogue_vessels(), models, parameters, {}, {})
+    return Bundle("partial", "", tuple(catalogue), models, parameters, {}, {})
 
 
 def run_until(pipeline: Pipeline, contact: Contact, options: Options, last: str) -> Work:

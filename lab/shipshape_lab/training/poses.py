@@ -16,7 +16,8 @@ def paper_pose(example: Example, boxes: list[ReferenceBox]) -> Pose:
     if np.cos(axis - example.pose.heading) < 0:
         axis += np.pi
     height = example.contact.sensor_height
-    return heading.anchor_box(points, axis, box, points[:, 2].min() if height is None else -height)
+    waterline = float(points[:, 2].min()) if height is None else -height
+    return heading.anchor_box(points, axis, box, waterline)
 
 
 def disturbed(pose: Pose, rng: np.random.Generator, *, wide: bool) -> Pose:

@@ -12,14 +12,12 @@ from torch import Tensor, nn
 
 from shipshape import alignment, frames
 from shipshape.types import Pose
-from shipshape_lab.simulator.vessels import CATALOGUE
 from shipshape_lab.training import arguments, export, loop
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import AlignedNet
 from shipshape_lab.training.poses import disturbed
 
 EPOCHS = 14
-CLASSES = len(CATALOGUE) + 1
 
 
 def guess(example: Example, rng: np.random.Generator) -> Pose:
@@ -75,8 +73,9 @@ def main(argv: list[str] | None = None) -> None:
         return to_item(example, guess(example, rng))
 
     torch.manual_seed(args.seed)
+    net = AlignedNet(len(examples.catalogue) + 1)
     data, schedule = loop.Drawn(examples.indices, draw, args.seed), loop.Schedule(args.epochs, seed=args.seed)
-    net = loop.train(AlignedNet(CLASSES), data, loss_of, schedule, args.out / "checkpoints/aligned.pt")
+    net = loop.train(net, data, loss_of, schedule, args.out / "checkpoints/aligned.pt")
     write(net, args.out / "bundle")
 
 

@@ -16,6 +16,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from shipshape.types import ImageMethod
+from shipshape_lab.simulator.catalogue import DEFAULT, same_vessels
+from shipshape_lab.simulator.clusters import load_catalogue
 from shipshape_lab.training import build_bundle
 
 log = logging.getLogger(__name__)
@@ -55,7 +57,10 @@ def train_step(step: tuple[str, ...], work: Path) -> None:
 
 
 def make_data(name: str, work: Path, lanes: int) -> None:
-    """Make a data set, unless it is there."""
+    """Make a data set of the default catalogue, unless it is there; one of another catalogue stays."""
+    made = work / "data" / f"{name}.npz"
+    if made.exists() and not same_vessels(load_catalogue(made), DEFAULT.vessels()):
+        return
     arguments = [name, "--out", str(work / "data"), "--jobs", str(lanes)]
     _run("shipshape_lab.simulator.datasets", arguments, work, f"data_{name}")
 

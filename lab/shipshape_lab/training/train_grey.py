@@ -13,9 +13,7 @@ from torch import Tensor, nn
 from shipshape import raster
 from shipshape.stages import projection
 from shipshape.types import ImageMethod, ReferenceBox
-from shipshape_lab.simulator.vessels import CATALOGUE
 from shipshape_lab.training import arguments, export, loop
-from shipshape_lab.training.catalogue import reference_boxes
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import GreyNet
 from shipshape_lab.training.poses import paper_pose
@@ -48,7 +46,8 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--method", type=ImageMethod, choices=list(ImageMethod), required=True)
     chosen, rest = parser.parse_known_args(argv)
     args = arguments.parse(__doc__, rest, epochs=EPOCHS)
-    examples, boxes = Examples.read(args.data, "train", catalogue_only=True), reference_boxes(CATALOGUE)
+    examples = Examples.read(args.data, "train", catalogue_only=True)
+    boxes = examples.boxes
     data = loop.Drawn(
         examples.indices, lambda i, rng: to_item(examples.drawn(i, rng), chosen.method, boxes), args.seed
     )

@@ -13,14 +13,12 @@ from torch import Tensor, nn
 from shipshape import raster
 from shipshape.stages import inpainting, projection
 from shipshape.types import Pose
-from shipshape_lab.simulator.vessels import CATALOGUE
 from shipshape_lab.training import arguments, export, loop
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import InpaintingNet
 from shipshape_lab.training.poses import disturbed
 
 EPOCHS = 12
-CLASSES = len(CATALOGUE) + 1
 WRONG_BOW = 0.01  # share of poses with bow and stern swapped, about what bow_stern leaves
 
 
@@ -78,14 +76,10 @@ def main(argv: list[str] | None = None) -> None:
         return to_item(example, guess(example, rng))
 
     torch.manual_seed(args.seed)
+    net = InpaintingNet(len(examples.catalogue) + 1, raster.aligned_frame(1.0).edges)
     data, schedule = loop.Drawn(examples.indices, draw, args.seed), loop.Schedule(args.epochs, seed=args.seed)
-    net = loop.train(new_net(), data, loss_of, schedule, args.out / "checkpoints/inpainting.pt")
+    net = loop.train(net, data, loss_of, schedule, args.out / "checkpoints/inpainting.pt")
     write(net, args.out / "bundle")
-
-
-def new_net() -> InpaintingNet:
-    """The network with its layer bounds."""
-    return InpaintingNet(CLASSES, raster.aligned_frame(1.0).edges)
 
 
 def write(net: nn.Module, folder: Path) -> None:

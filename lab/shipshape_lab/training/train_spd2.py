@@ -9,7 +9,7 @@ The restored ones need the networks of the stages before them.
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,20 +17,20 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from shipshape.bundle import CatalogueVessel
 from shipshape.pipeline import Pipeline
 from shipshape.stages import keypoints, spd2
 from shipshape.stages.bow_stern import PARTS
 from shipshape.stages.keypoints import KeypointParams
-from shipshape.types import ImageMethod, Options, Preset
-from shipshape_lab.simulator.vessels import CATALOGUE
+from shipshape.types import ImageMethod, Options, Preset, ReferenceBox
 from shipshape_lab.training import arguments, export, loop
-from shipshape_lab.training.catalogue import reference_boxes
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import Spd2Net
 from shipshape_lab.training.partial import UNCALIBRATED, partial_bundle, run_until
 from shipshape_lab.training.poses import paper_pose
 
 EPOCHS = 4
+KNOW_UNKNOWN = ("prior", "spd2")  # the others learn from the vessels of the catalogue alone
 KEYPOINTS = 8  # more than the three of inference: each one is a training sample of its own (section 3.3.2)
 RADIUS = UNCALIBRATED["common"]["spd2_radius"]
 Described = tuple[np.ndarray, np.ndarray]  # SPD2 images (k, 5, 16, 32) and a label for each
@@ -52,9 +52,8 @@ def of_prior(pipeline: Pipeline) -> Callable[[Example, np.random.Generator], Des
     return describe
 
 
-def of_parts() -> Callable[[Example, np.random.Generator], Described]:
+def of_parts(boxes: list[ReferenceBox]) -> Callable[[Example, np.random.Generator], Described]:
     """Raw clusters in the paper's pose, half of them with bow and stern swapped, by where the keypoint is."""
-    boxes = reference_boxes(CATALOGUE)
 
     def describe(example: Example, rng: np.random.Generator) -> Described:
         pose = paper_pose(example, boxes)
@@ -93,17 +92,17 @@ def loss_of(net: nn.Module, batch: dict[str, Tensor]) -> Tensor:
     return nn.functional.cross_entropy(net(batch["images"]).float(), batch["label"])
 
 
-def source(model: str, folder: Path) -> tuple[Callable, int, bool]:
-    """How to describe an example for `model`, its classes, and whether it knows the catalogue alone."""
+def source(model: str, folder: Path, catalogue: Sequence[CatalogueVessel]) -> tuple[Callable, int]:
+    """How to describe an example for `model`, and its number of classes."""
     if model == "parts":
-        return of_parts(), len(PARTS), True
-    pipeline = Pipeline(partial_bundle(folder))
+        return of_parts([vessel.box for vessel in catalogue]), len(PARTS)
+    pipeline = Pipeline(partial_bundle(folder, catalogue))
     if model == "prior":
-        return of_prior(pipeline), len(CATALOGUE) + 1, False
+        return of_prior(pipeline), len(catalogue) + 1
     if model == "spd2":
-        return of_restored(pipeline, Options(Preset.BEST)), len(CATALOGUE) + 1, False
+        return of_restored(pipeline, Options(Preset.BEST)), len(catalogue) + 1
     method = ImageMethod(model.removeprefix("spd2_"))
-    return of_restored(pipeline, Options(Preset.PAPER, method)), len(CATALOGUE), True
+    return of_restored(pipeline, Options(Preset.PAPER, method)), len(catalogue)
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -113,8 +112,9 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--model", choices=models, required=True)
     chosen, rest = parser.parse_known_args(argv)
     args = arguments.parse(__doc__, rest, epochs=EPOCHS)
-    describe, classes, catalogue_only = source(chosen.model, args.out / "bundle")
-    images, labels = collect(Examples.read(args.data, "train", catalogue_only=catalogue_only), describe, args.seed)
+    examples = Examples.read(args.data, "train", catalogue_only=chosen.model not in KNOW_UNKNOWN)
+    describe, classes = source(chosen.model, args.out / "bundle", examples.catalogue)
+    images, labels = collect(examples, describe, args.seed)
     data = loop.Drawn(
         np.arange(len(labels)),
         lambda i, rng: {"images": images[i].astype(np.float32), "label": labels[i]},

@@ -35,7 +35,6 @@ _NOMINAL = {
 }
 
 VESSEL_TYPES: tuple[str, ...] = tuple(_NOMINAL)
-CATALOGUE: tuple[str, ...] = ("rhib", "pilot_boat", "fishing_boat", "tug", "patrol_boat")
 LENGTH_RANGE = (4.5, 30.0)  # m; a sister hull drawn outside is stretched or shortened to fit
 
 
