@@ -14,11 +14,13 @@ from tqdm import tqdm
 
 from shipshape import frames, raster
 from shipshape.bundle import Bundle
+from shipshape.errors import Unprocessable
 from shipshape.pipeline import Pipeline
 from shipshape.softmax import softmax
 from shipshape.stages import bow_stern, classification, keypoints, prior, projection, spd2
 from shipshape.stages.keypoints import KeypointParams
 from shipshape.types import ImageMethod, Options, Preset
+from shipshape.validation import ContactLimits, check_contact
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.partial import run_until
 
@@ -41,7 +43,7 @@ def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> dict:
     """The bundle's parameters, fitted."""
     parameters = copy.deepcopy(dict(bundle.parameters))
     rng = np.random.default_rng(seed)
-    contacts = [validation.drawn(int(i), rng) for i in validation.indices]
+    contacts = [e for e in (validation.drawn(int(i), rng) for i in validation.indices) if _is_accepted(e)]
     catalogue = [example for example in contacts if example.label < len(bundle.catalogue)]
     pipeline = Pipeline(bundle)
     parameters["common"]["prior_temperature"] = prior_temperature(pipeline, contacts)
@@ -53,6 +55,14 @@ def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> dict:
     parameters["best"].update(best)
     parameters["common"]["unknown_above"] = unknown_above
     return parameters
+
+
+def _is_accepted(example: Example) -> bool:
+    try:
+        check_contact(example.contact, ContactLimits())
+    except Unprocessable:  # a few points of a far end, too close together: the service would refuse it
+        return False
+    return True
 
 
 def _with(bundle: Bundle, parameters: dict) -> Bundle:
