@@ -67,43 +67,27 @@ def count_neighbours(points: Float32[np.ndarray, "n 3"], radius: float) -> Int32
     """How many other points lie within `radius` of each point: n_i = |{j != i: |p_i - p_j| <= r}|.
 
     Points are sorted into cubes a little larger than `radius`. Cubes above one another follow each other, so the
-    neighbours of a point that come after it lie in five runs: its own column, and four of the eight beside it.
+    neighbours of a point lie in nine runs of points, which the compiler compares several at a time.
     """
     cubes, start, order = _sort_into_cubes(points, radius)
     _, deep, high = cubes
-    lined_up = points[order]
-    found = np.zeros(len(points), np.int32)
+    x, y, z = points[order, 0], points[order, 1], points[order, 2]
     limit = np.float32(radius) * np.float32(radius)
+    counts = np.empty(len(points), np.int32)
     for cube in range(len(start) - 1):
         if start[cube] == start[cube + 1]:
             continue
-        z, y, x = cube % high, cube // high % deep, cube // high // deep
+        up, beside, ahead = cube % high, cube // high % deep, cube // high // deep
         for i in range(start[cube], start[cube + 1]):
-            _count_run(lined_up, i, (i + 1, start[cube + (2 if z + 1 < high else 1)]), limit, found)
-        for run in range(4):
-            nx, ny = x + (run > 0), y + (1 if run == 0 else run - 2)
-            if nx < cubes[0] and 0 <= ny < deep:
-                column = (nx * deep + ny) * high
-                span = (start[column + max(z - 1, 0)], start[column + min(z + 2, high)])
-                for i in range(start[cube], start[cube + 1]):
-                    _count_run(lined_up, i, span, limit, found)
-    counts = np.empty(len(points), np.int32)
-    counts[order] = found
+            found = -1  # the point itself
+            for nx in range(max(ahead - 1, 0), min(ahead + 2, cubes[0])):
+                for ny in range(max(beside - 1, 0), min(beside + 2, deep)):
+                    column = (nx * deep + ny) * high
+                    for j in range(start[column + max(up - 1, 0)], start[column + min(up + 2, high)]):
+                        dx, dy, dz = x[i] - x[j], y[i] - y[j], z[i] - z[j]
+                        found += dx * dx + dy * dy + dz * dz <= limit
+            counts[order[i]] = found
     return counts
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _count_run(
-    points: Float32[np.ndarray, "n 3"],
-    i: int,
-    run: tuple[int, int],
-    limit: np.float32,
-    found: Int32[np.ndarray, " n"],
-) -> None:
-    for j in range(run[0], run[1]):
-        if _squared_distance(points, i, j) <= limit:
-            found[i] += 1
-            found[j] += 1
 
 
 _MOST_CUBES = 1 << 20  # bounds memory; wider clouds get larger cubes
@@ -195,27 +179,62 @@ def bin_spherically(
         points: (n, 3), any frame with z up.
         centre: the keypoint, same frame.
         radius: outer radius of the neighbourhood, m.
-        shape: strata (equal shells of distance), rows (elevation, zenith first), columns (azimuth from -pi).
+        shape: strata (equal shells of distance), rows (elevation, zenith first), columns (azimuth from -pi; a
+            multiple of 4).
 
     Returns:
         Counts by stratum and direction; nearest and farthest distance by direction (0 where empty), m.
     """
     strata, rows, columns = shape
+    # Bounds of rows and columns as sines and tangents: comparing with them is far cheaper than an inverse.
+    sines = np.sin((0.5 - np.arange(1, rows) / rows) * np.pi).astype(np.float32)
+    tangents = np.tan(np.arange(1, columns // 4) * (2 * np.pi / columns)).astype(np.float32)
     count = np.zeros((strata, rows, columns), np.int32)
     nearest = np.zeros((rows, columns), np.float32)
     farthest = np.zeros((rows, columns), np.float32)
+    limit = np.float32(radius) * np.float32(radius)
     for i in range(len(points)):
         dx, dy, dz = points[i, 0] - centre[0], points[i, 1] - centre[1], points[i, 2] - centre[2]
-        distance = np.sqrt(dx * dx + dy * dy + dz * dz)
-        if distance == 0.0 or distance >= radius:
+        squared = dx * dx + dy * dy + dz * dz
+        if squared == 0.0 or squared >= limit:
             continue
-        row = min(int((0.5 - np.arcsin(dz / distance) / np.pi) * rows), rows - 1)
-        column = min(int((0.5 + np.arctan2(dy, dx) / (2 * np.pi)) * columns), columns - 1)
+        distance = np.sqrt(squared)
+        row = _elevation_row(dz / distance, sines)
+        column = _azimuth_column(dx, dy, tangents)
         count[min(int(distance / radius * strata), strata - 1), row, column] += 1
         if nearest[row, column] == 0.0 or distance < nearest[row, column]:
             nearest[row, column] = distance
         farthest[row, column] = max(farthest[row, column], distance)
     return count, nearest, farthest
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _elevation_row(sine: float, sines: Float32[np.ndarray, " edges"]) -> int:
+    """How many of the descending `sines` are above `sine`: the row, zenith first."""
+    low, high = 0, len(sines)
+    while low < high:
+        middle = (low + high) // 2
+        if sine < sines[middle]:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _azimuth_column(dx: float, dy: float, tangents: Float32[np.ndarray, " edges"]) -> int:
+    """Column of the azimuth of (dx, dy), from -pi, with `edges` + 1 columns in each quarter turn."""
+    quarter = len(tangents) + 1
+    if dx == 0.0 and dy == 0.0:  # straight above or below: by convention azimuth 0
+        return 2 * quarter
+    if dy < 0:  # columns of -pi to 0
+        along, across, first = (-dx, -dy, 0) if dx < 0 else (-dy, dx, quarter)
+    else:
+        along, across, first = (dx, dy, 2 * quarter) if dx > 0 else (dy, -dx, 3 * quarter)
+    step = 0
+    while step < len(tangents) and across >= along * tangents[step]:
+        step += 1
+    return first + step
 
 
 @njit(cache=True, nogil=True)
