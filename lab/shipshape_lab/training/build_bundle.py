@@ -1,4 +1,4 @@
-"""Calibrate the trained networks on the validation set and write them as a verified bundle.
+"""Quantise the trained networks, calibrate them on the validation set and write them as a verified bundle.
 
 python -m shipshape_lab.training.build_bundle --data runs/data --out runs/default --to models
 """
@@ -15,6 +15,7 @@ from shipshape_lab.simulator.clusters import load_catalogue
 from shipshape_lab.training.calibrate import calibrated
 from shipshape_lab.training.examples import Examples
 from shipshape_lab.training.partial import partial_bundle
+from shipshape_lab.training.quantise import quantise_all
 
 
 def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
@@ -28,9 +29,11 @@ def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
     if not same_vessels(trained, validation.catalogue):
         names = (", ".join(vessel.name for vessel in vessels) for vessels in (trained, validation.catalogue))
         raise ValueError("{} must hold one catalogue, but train has {} and validation {}".format(data, *names))
-    parameters = calibrated(partial_bundle(networks, validation.catalogue), validation, seed=seed)
+    shipped = networks.with_name("shipped")
+    quantise_all(networks, shipped, Examples.read(data, "train"), seed=seed)
+    parameters = calibrated(partial_bundle(shipped, validation.catalogue), validation, seed=seed)
     to.mkdir(parents=True, exist_ok=True)
-    files = sorted(networks.glob("*.onnx"))
+    files = sorted(shipped.glob("*.onnx"))
     for file in files:
         shutil.copyfile(file, to / file.name)
     return write_manifest(
