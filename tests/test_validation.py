@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
 
-from builders import BOAT, contact_of, seen_hull
+from builders import ANGLES, BOAT, contact_of, properties, seen_hull, turn_level, whole_hull
 from shipshape.errors import InvalidInput, TooLarge, Unprocessable
-from shipshape.types import Contact, Pose
+from shipshape.types import Contact, Pose, ReferenceBox
 from shipshape.validation import ContactLimits, check_contact
 
 LIMITS = ContactLimits()
@@ -54,7 +55,7 @@ def test_ten_points_are_enough() -> None:
 
 
 def test_a_million_points_are_too_large() -> None:
-    with pytest.raises(TooLarge, match=r"expected at most 65536 points.* got 1000000$"):
+    with pytest.raises(TooLarge, match=r"expected at most 16384 points.* got 1000000$"):
         check_contact(contact_of(np.zeros((1_000_000, 3))), LIMITS)
 
 
@@ -120,3 +121,44 @@ def test_a_cluster_under_the_water_is_refused() -> None:
     expected = r"above the water, which is at z = -2 m, got a highest point at z = -3"
     with pytest.raises(Unprocessable, match=expected):
         check_contact(Contact(points, sensor_height=2.0), ContactLimits())
+
+
+def verdict(points: np.ndarray) -> str:
+    try:
+        check_contact(contact_of(points), LIMITS)
+    except InvalidInput as refused:
+        return str(refused).partition(", got ")[0]
+    return "accepted"
+
+
+LONG = ReferenceBox(length=20.0, beam=4.0, height=3.0)
+JUDGED = {
+    "abreast, 6 m off": (whole_hull(Pose(0.0, (0.0, 8.0, -3.0), LONG)), "accepted"),
+    "around the sensor": (whole_hull(Pose(0.0, (2.0, 1.0, -3.0), LONG)), "expected a cluster in the level frame"),
+    "149 m": (spread(149.0), "accepted"),
+    "180 m": (spread(180.0), "expected one vessel's cluster, at most 150 m across"),
+    "a line through the sensor": (spread(20.0, distance=0.0), "expected a cluster in the level frame"),
+    "two far ends": (np.repeat([[40, 0, 0], [40, 140, 0]], 5, axis=0), "accepted"),
+    "spray": (spread(0.4), "expected a cluster at least 0.5 m across"),
+    "a point": (np.full((20, 3), 30.0), "expected a cluster at least 0.5 m across"),
+    "a mast": (
+        np.linspace([40, 0, -3], [40.6, 0, 160], 50),
+        "expected one vessel's cluster, at most 150 m across",
+    ),
+    "too far": (GOOD + np.float32([1_010, 0, 0]), "expected a cluster within 1000 m"),
+}
+
+
+@pytest.mark.parametrize("case", JUDGED)
+@properties(30)
+@given(turn=ANGLES)
+def test_turning_the_world_changes_no_verdict(case: str, turn: float) -> None:
+    points, expected = JUDGED[case]
+    assert verdict(turn_level(np.asarray(points, np.float32), turn)).startswith(expected)
+
+
+def test_a_hull_of_very_many_corners_takes_little_memory_and_keeps_its_size() -> None:
+    angles = np.linspace(-np.pi, np.pi, LIMITS.max_points, endpoint=False)
+    circle = np.column_stack([300 + 75.2 * np.cos(angles), 75.2 * np.sin(angles), 0 * angles])
+    assert verdict(circle) == "expected one vessel's cluster, at most 150 m across"
+    assert verdict(circle * [0.99, 0.99, 1]) == "accepted"

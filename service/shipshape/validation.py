@@ -2,10 +2,16 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from jaxtyping import Float32
 
 from shipshape.errors import InvalidInput, TooLarge, Unprocessable
 from shipshape.types import Contact
+
+_TOUCHING = 1e-3  # m; rounding puts a hull through the sensor a little to either side of it
+_ANGLES = np.linspace(-np.pi, np.pi, 256, endpoint=False)
+_DIRECTIONS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,8 +19,8 @@ class ContactLimits:
     """What a cluster may be."""
 
     min_points: int = 10  # fewer carry no shape
-    max_points: int = 65_536  # bounds the work of one contact
-    max_extent: float = 150.0  # m, in any direction; wider is a scene, not a vessel that was trained on
+    max_points: int = 16_384  # bounds the work of one contact
+    max_extent: float = 150.0  # m, between any two points; wider is a scene, not a vessel that was trained on
     min_extent: float = 0.5  # m, horizontally; smaller is spray or a buoy
     max_range: float = 1_000.0  # m; beyond every marine LiDAR
 
@@ -56,21 +62,32 @@ def _check_numbers(contact: Contact) -> None:
         raise Unprocessable(f"expected the own true heading in degrees, got {own}")
 
 
-def _check_extent(points: np.ndarray, limits: ContactLimits) -> None:
-    lower, upper = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
-    extent = float(np.max(upper - lower))
+def _check_extent(points: Float32[np.ndarray, "n 3"], limits: ContactLimits) -> None:
+    hull = cv2.convexHull(
+        np.ascontiguousarray(points[:, :2])
+    )  # unlike a box along x and y, it turns with the world
+    across, tall = _diameter(hull[:, 0]), float(np.ptp(points[:, 2].astype(np.float64)))
+    extent = max(across, tall)
     if extent > limits.max_extent:
         raise Unprocessable(
             f"expected one vessel's cluster, at most {limits.max_extent:g} m across, got {extent:.1f} m: "
             "split a scan into clusters first"
         )
-    across = float(np.max((upper - lower)[:2]))
     if across < limits.min_extent:
         raise Unprocessable(f"expected a cluster at least {limits.min_extent:g} m across, got {across:.2f} m")
-    nearest = float(np.hypot(*np.clip(0.0, lower[:2], upper[:2])))
-    if nearest == 0.0:
+    nearest = -cv2.pointPolygonTest(hull, (0.0, 0.0), measureDist=True)
+    if nearest < _TOUCHING:
         raise Unprocessable(
             "expected a cluster in the level frame (origin at the LiDAR), got points on all sides of the origin"
         )
     if nearest > limits.max_range:
         raise Unprocessable(f"expected a cluster within {limits.max_range:g} m, got one at {nearest:.0f} m")
+
+
+def _diameter(hull: Float32[np.ndarray, "corners 2"]) -> float:
+    """Largest distance between two corners; of a hull of very many corners only the outermost are compared."""
+    corners = hull.astype(np.float64)
+    if len(corners) > len(_DIRECTIONS):
+        corners = corners[np.unique((_DIRECTIONS @ corners.T).argmax(axis=1))]
+    between = corners[:, None] - corners
+    return float(np.hypot(between[..., 0], between[..., 1]).max())
