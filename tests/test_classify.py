@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import numpy as np
@@ -91,3 +92,16 @@ def test_pictures_never_overwrite_each_other(tmp_path):
         ]
     ]
     assert names == ["tug.png", "tug_2.png", "scan-00012.png", "s-0000.png"]
+
+
+def test_a_file_name_that_is_no_utf8_is_told_with_a_mark_in_its_place(scan, tmp_path):
+    odd = tmp_path / os.fsdecode(b"t\xfcg.npz")
+    scan.rename(odd)
+    (answered, refused, _), _ = classified(odd)
+    assert answered.contact.contact_id == "t\ufffdg-0000"
+    assert to_record(answered)["file"] == str(tmp_path / "t\ufffdg.npz")
+    assert orjson.dumps(to_record(answered))
+    assert orjson.dumps(to_record(refused))
+    (gone,), _ = classified(tmp_path / os.fsdecode(b"g\xf6ne.npy"))
+    assert "expected to read g\ufffdne.npy" in to_record(gone)["error"]
+    assert orjson.dumps(to_record(gone))

@@ -1,4 +1,5 @@
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -101,6 +102,15 @@ def test_one_picture_a_recognised_cluster(scan, tmp_path, pipeline, capsys):
     pictures = sorted((tmp_path / "new" / "pictures").iterdir())
     assert [path.name for path in pictures] == ["scan-0000.png", "scan-0002.png"]
     assert cv2.imread(str(pictures[0])).shape == (900, 1600, 3)
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]], ids=["table", "json"])
+def test_a_file_name_that_is_no_utf8_is_drawn_and_printed(form, cluster, tmp_path, pipeline, capsys):
+    odd = tmp_path / os.fsdecode(b"t\xfcg.npy")
+    cluster.rename(odd)
+    assert main(["classify", str(odd), "--png", str(tmp_path / "pictures"), *form]) == 0
+    assert "t\ufffdg.npy" in capsys.readouterr().out
+    assert [path.name for path in (tmp_path / "pictures").iterdir()] == ["t\ufffdg.png"]
 
 
 def test_a_picture_folder_that_cannot_be_is_a_usage_error(cluster, pipeline, capsys):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from builders_recognition import SIZE, recognised
 from shipshape.render import render_png
-from shipshape.render.canvas import Canvas, Rect
+from shipshape.render.canvas import Canvas, Font, Rect
 from shipshape.render.style import INFERRED, MEASURED
 from shipshape.render.text_panels import vessel_title
 from shipshape.render.views import View, bow_line, box_corners, from_above, from_direction
@@ -111,3 +111,10 @@ def test_box_corners_start_at_the_port_bow_on_the_waterline():
     middle, tip = bow_line(Box((10.0, 0.0, 1.5), SIZE), math.pi / 2)
     np.testing.assert_allclose(middle, (10, 0, 0))
     assert tip[1] > 6
+
+
+@pytest.mark.parametrize("text", ["a\udcffb", "\ud800", "", "a\0b", "two\nlines", "\u0301", "\U0001f6a2"])
+def test_any_text_can_be_drawn(text):
+    canvas = Canvas(100, 50, (0, 0, 0))
+    font = Font((255, 255, 255))
+    assert canvas.text(text, (5.0, 30.0), font) == canvas.text_width(text, font) >= 0

@@ -1,6 +1,7 @@
 """Files of clusters -> one outcome a cluster: a recognition, or the sentence that says why there is none."""
 
 import math
+import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,10 +52,10 @@ def classify_files(files: Iterable[Path], recognise: Recognise, situation: Situa
         try:
             clusters = read_clusters(file)
         except FileError as error:
-            yield Refused(file, None, 0, str(error))
+            yield Refused(file, None, 0, readable(error))
             continue
         if not clusters:
-            yield Refused(file, None, 0, f"expected at least one cluster in {file.name}, got none")
+            yield Refused(file, None, 0, readable(f"expected at least one cluster in {file.name}, got none"))
         for index, points in enumerate(clusters):
             contact = Contact(
                 points,
@@ -68,9 +69,14 @@ def classify_files(files: Iterable[Path], recognise: Recognise, situation: Situa
                 yield Refused(file, index, len(clusters), str(error))
 
 
+def readable(name: object) -> str:
+    """`name` as text that can be printed and sent; a byte of a file name that is no UTF-8 becomes U+FFFD."""
+    return os.fsencode(str(name)).decode("utf-8", "replace")
+
+
 def to_record(outcome: Outcome) -> dict[str, Any]:
     """The outcome as plain values, keys and units as `shipshape classify --help` lists them."""
-    source = {"file": str(outcome.file), "index": outcome.index}
+    source = {"file": readable(outcome.file), "index": outcome.index}
     if isinstance(outcome, Refused):
         return {**source, "error": outcome.error}
     recognition = outcome.recognition
@@ -114,9 +120,10 @@ class PictureFolder:
 
 
 def _contact_id(file: Path, index: int, total: int) -> str:
+    stem = readable(file.stem)
     if total == 1:
-        return file.stem
-    return f"{file.stem}-{index:0{max(4, math.ceil(math.log10(total)))}d}"
+        return stem
+    return f"{stem}-{index:0{max(4, math.ceil(math.log10(total)))}d}"
 
 
 def _box_record(recognition: Recognition) -> dict[str, Any]:

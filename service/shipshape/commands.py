@@ -11,7 +11,16 @@ import cv2
 import orjson
 
 from shipshape.bundle import Bundle, load_bundle
-from shipshape.classify import Answered, Outcome, PictureFolder, Refused, Situation, classify_files, to_record
+from shipshape.classify import (
+    Answered,
+    Outcome,
+    PictureFolder,
+    Refused,
+    Situation,
+    classify_files,
+    readable,
+    to_record,
+)
 from shipshape.errors import FileError
 from shipshape.pipeline import Pipeline
 from shipshape.render import render_png
@@ -123,12 +132,12 @@ def _json_lines(outcomes: Iterable[Outcome]) -> Lines:
 
 
 def _table_lines(outcomes: Iterable[Outcome], bundle: Bundle, files: list[Path]) -> Lines:
-    names = [f"{file} 0000" if file.suffix == ".npz" else str(file) for file in files]
+    names = [readable(f"{file} 0000" if file.suffix == ".npz" else file) for file in files]
     layout = columns(names, [vessel.name for vessel in bundle.catalogue])
     yield None, title_line(layout)
     for outcome in outcomes:
         many = outcome.index is not None and outcome.total > 1
-        name = f"{outcome.file} {outcome.index}" if many else f"{outcome.file}"
+        name = readable(f"{outcome.file} {outcome.index}" if many else outcome.file)
         if isinstance(outcome, Answered):
             yield outcome, answer_line(layout, name, outcome.recognition)
         else:
@@ -155,7 +164,7 @@ def _with_progress(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
             shown = time.monotonic()
             filled = 30 * (outcome.index + 1) // outcome.total
             bar = f"{'█' * filled}{'░' * (30 - filled)} {outcome.index + 1}/{outcome.total}"
-            print(f"\r\x1b[K{bar} {outcome.file.name}", end="", file=sys.stderr, flush=True)
+            print(f"\r\x1b[K{bar} {readable(outcome.file.name)}", end="", file=sys.stderr, flush=True)
         yield outcome
     print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 

@@ -120,6 +120,7 @@ class Canvas:
 
     def text(self, text: str, position: Point, font: Font) -> float:
         """One line of text on the baseline at `position`; returns its width."""
+        text = _drawable(text)
         width = self.text_width(text, font)
         shift = {"left": 0.0, "middle": width / 2, "right": width}[font.anchor]
         origin = _scaled((position[0] - shift, position[1]))
@@ -130,7 +131,7 @@ class Canvas:
     def text_width(self, text: str, font: Font) -> float:
         """Width of a line of text."""
         size = round(font.size * SCALE)
-        left, _, width, _ = cv2.getTextSize((0, 0), text, (0, 0), self._font, size, font.weight)
+        left, _, width, _ = cv2.getTextSize((0, 0), _drawable(text), (0, 0), self._font, size, font.weight)
         return float(left + width) / SCALE
 
     def _window(self, corners: np.ndarray) -> tuple[slice, slice]:
@@ -149,3 +150,8 @@ class Canvas:
 
 def _scaled(point: Point) -> tuple[int, int]:
     return round(point[0] * SCALE), round(point[1] * SCALE)
+
+
+def _drawable(text: str) -> str:
+    """`text` without lone surrogates, on which OpenCV ends the process."""
+    return text.encode("utf-8", "replace").decode()
