@@ -60,7 +60,7 @@ def npy_bytes(array: np.ndarray) -> bytes:
 
 clouds = arrays.arrays(
     np.float32,
-    st.tuples(st.integers(0, 20), st.just(3)),
+    st.tuples(st.integers(1, 20), st.just(3)),
     elements=st.floats(-1000, 1000, width=32),
 )
 
@@ -77,7 +77,7 @@ def test_npz_gives_back_the_clusters(tmp_path_factory, clusters):
 
 
 @given(
-    cloud=clouds.filter(len),
+    cloud=clouds,
     delimiter=st.sampled_from([",", ";", " ", "\t", ", "]),
     names=st.sampled_from([[], ["x", "y", "z"], ["intensity", "z", "X", "y"], ['"Y[m]"', '"x[m]"', '"Z[m]"']]),
 )
@@ -174,7 +174,13 @@ def test_what_is_no_cluster_is_refused_in_one_sentence(tmp_path, name, content, 
     [
         ({"points": POINTS}, "expected the arrays points and n in scan.npz, got points"),
         ({"points": POINTS, "n": np.array([1, 1])}, "sum to the 3 points, got int64 of shape (2,) and sum 2"),
-        ({"points": POINTS, "n": np.array([4, -1])}, "sum to the 3 points, got int64"),
+        ({"points": POINTS, "n": np.array([4, -1])}, "sum to the 3 points, got numbers from -1 to 4"),
+        ({"points": POINTS, "n": np.array([3, 0])}, "whole numbers above 0 that sum to the 3 points, got numbers"),
+        (
+            {"points": POINTS, "n": np.array([2**64 - 1, 4], np.uint64)},
+            "got numbers from 4 to 18446744073709551615",
+        ),
+        ({"points": POINTS[:0], "n": np.zeros(300_000, np.uint8)}, "expected at most 100000 clusters in scan.npz"),
         ({"points": POINTS, "n": np.array([1.5, 1.5])}, "got float64 of shape (2,)"),
         ({"points": POINTS, "n": np.array(3)}, "got int64 of shape ()"),
         (
@@ -200,6 +206,18 @@ def npy_claiming(rows: int) -> bytes:
     stream = io.BytesIO()
     np.lib.format.write_array_header_1_0(stream, {"descr": "<f4", "fortran_order": False, "shape": (rows, 3)})
     return stream.getvalue()
+
+
+def npz_of_empty_clusters(count: int) -> bytes:
+    stream = io.BytesIO()
+    np.savez_compressed(stream, points=np.empty((0, 3), np.float32), n=np.zeros(count, np.int64))
+    return stream.getvalue()
+
+
+def test_a_small_npz_of_very_many_clusters_is_refused_before_it_is_unpacked(tmp_path):
+    (tmp_path / "scan.npz").write_bytes(npz_of_empty_clusters(300_000))
+    assert (tmp_path / "scan.npz").stat().st_size < 5_000
+    assert "at most 100000 clusters in scan.npz, got an n of 2400128 bytes" in refusal(tmp_path / "scan.npz")
 
 
 def npz_claiming(rows: int) -> bytes:

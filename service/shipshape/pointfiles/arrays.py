@@ -12,6 +12,9 @@ from jaxtyping import Float32
 from shipshape.errors import FileError
 from shipshape.pointfiles.columns import as_points, cause, listed
 
+MAX_CLUSTERS = 100_000  # of one file; each costs memory of its own, however few points it has
+_HEADER_BYTES = 4096
+
 _NPZ_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError)
 
 
@@ -28,8 +31,8 @@ def read_npz(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
             names = [name.removesuffix(".npy") for name in archive.namelist()]
             if not {"points", "n"} <= set(names):
                 raise FileError(f"expected the arrays points and n in {path.name}, got {listed(names)}")
+            n = _read_counts(archive, path.name)
             points = as_points(_read_member(archive, "points", max_bytes), f"points in {path.name}")
-            n = _read_member(archive, "n", max_bytes)
     except _NPZ_ERRORS as error:
         raise FileError(f"expected {path.name} to be a complete .npz file, got: {cause(error)}") from error
     return _split(points, n, path.name)
@@ -66,10 +69,24 @@ def _read_header(stream: io.BufferedIOBase) -> tuple[tuple[int, ...], np.dtype]:
     return shape, dtype
 
 
+def _read_counts(archive: zipfile.ZipFile, what: str) -> np.ndarray:
+    """The points of each cluster; refused by their number before they are unpacked."""
+    size = archive.getinfo("n.npy").file_size
+    if size > 8 * MAX_CLUSTERS + _HEADER_BYTES:
+        raise FileError(f"expected at most {MAX_CLUSTERS} clusters in {what}, got an n of {size} bytes")
+    n = _read_array(io.BytesIO(archive.read("n.npy")), size, "n")
+    if n.size > MAX_CLUSTERS:
+        raise FileError(f"expected at most {MAX_CLUSTERS} clusters in {what}, got {n.size}")
+    return n
+
+
 def _split(points: Float32[np.ndarray, "total 3"], n: np.ndarray, what: str) -> list[Float32[np.ndarray, "_ 3"]]:
-    if n.ndim != 1 or n.dtype.kind not in "iu" or (n.size and n.min() < 0) or int(n.sum()) != len(points):
-        raise FileError(
-            f"expected n in {what} to be whole numbers that sum to the {len(points)} points, "
-            f"got {n.dtype} of shape {n.shape} and sum {n.sum() if n.dtype.kind in 'iuf' else '(none)'}"
-        )
-    return np.split(points, np.cumsum(n)[:-1]) if n.size else []
+    expected = f"expected n in {what} to be whole numbers above 0 that sum to the {len(points)} points"
+    if n.ndim != 1 or n.dtype.kind not in "iu":
+        raise FileError(f"{expected}, got {n.dtype} of shape {n.shape}")
+    if n.size and not 1 <= n.min() <= n.max() <= len(points):
+        raise FileError(f"{expected}, got numbers from {n.min()} to {n.max()}")
+    total = int(n.sum(dtype=np.int64))  # cannot wrap: at most MAX_CLUSTERS numbers, none above the points
+    if total != len(points):
+        raise FileError(f"{expected}, got {n.dtype} of shape {n.shape} and sum {total}")
+    return np.split(points, np.cumsum(n, dtype=np.int64)[:-1]) if n.size else []
