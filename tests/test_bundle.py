@@ -1,11 +1,13 @@
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from builders_models import CLASSES, PARAMETERS, untrained_bundle
 from builders_onnx import CATALOGUE, doubling_onnx, write_tiny_bundle
-from shipshape.bundle import CatalogueVessel, load_bundle
+from shipshape.bundle import CatalogueVessel, check_fit, load_bundle
 from shipshape.bundle_writer import write_manifest
 from shipshape.errors import BundleError
 
@@ -119,3 +121,60 @@ def test_a_stage_that_misses_a_key_learns_where(folder):
     with pytest.raises(BundleError, match=r"expected models\.heading in manifest\.toml, got prior"):
         bundle.models["heading"]
     assert bundle.parameters.get("paper") is None
+
+
+def with_parameter(table, key, value):
+    bundle = untrained_bundle()
+    return replace(bundle, parameters={**PARAMETERS, table: {**PARAMETERS[table], key: value}})
+
+
+def test_a_bundle_whose_parts_belong_together_fits():
+    check_fit(untrained_bundle())
+    check_fit(with_parameter("best", "note", "free"))
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [
+        ("common", "spd2_radius", 0.0),
+        ("common", "prior_temperature", float("nan")),
+        ("common", "unknown_above", 1.5),
+        ("paper", "heading_std", -1.0),
+        ("paper", "part_keypoints", 0),
+        ("paper", "part_sharpness", float("inf")),
+        ("paper", "empty_below", "low"),
+        ("best", "looks", "2"),
+        ("best", "looks", 0),
+        ("best", "looks", True),
+        ("best", "heading_std_scale", 0),
+        ("best", "bow_temperature", 0),
+        ("best", "fusion_weights", [0.5, 0.5]),
+        ("best", "fusion_weights", 0.5),
+        ("best", "fusion_weights", [0.4, 0.3, 0.2, "0.1"]),
+    ],
+)
+def test_a_parameter_that_the_stages_cannot_use_is_refused_in_one_sentence(table, key, value):
+    with pytest.raises(BundleError, match=rf"^expected another value of parameters\.{table}\.{key}\b.*, got "):
+        check_fit(with_parameter(table, key, value))
+
+
+def test_a_parameter_that_is_missing_is_refused_in_one_sentence():
+    best = {key: value for key, value in PARAMETERS["best"].items() if key != "looks"}
+    with pytest.raises(
+        BundleError, match=r"^expected the key parameters\.best\.looks in manifest\.toml, got none$"
+    ):
+        check_fit(replace(untrained_bundle(), parameters={**PARAMETERS, "best": best}))
+    with pytest.raises(BundleError, match=r"^expected the key parameters\.common in manifest\.toml, got none$"):
+        check_fit(replace(untrained_bundle(), parameters={}))
+
+
+def test_a_catalogue_of_another_length_than_the_networks_classes_is_refused_in_one_sentence():
+    bundle = untrained_bundle()
+    with pytest.raises(
+        BundleError, match=r"to tell \d classes, for the 2 vessels of the catalogue, got a network"
+    ):
+        check_fit(replace(bundle, catalogue=bundle.catalogue[:2]))
+    networks = {**bundle.models, "spd2_full_top": bundle.models["spd2"]}
+    expected = rf"^expected spd2_full_top to tell {CLASSES - 1} classes, .*, got a network for {CLASSES}$"
+    with pytest.raises(BundleError, match=expected):
+        check_fit(replace(bundle, models=networks))

@@ -183,6 +183,20 @@ def test_bundle_verify_misses_what_the_pipeline_needs(tmp_path, capsys):
     assert "shipshape: expected " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", [["bundle", "verify", "x"], ["check"], ["classify", "x.npy"]])
+def test_a_bundle_that_breaks_the_run_exits_with_2_and_one_sentence(command, pipeline, monkeypatch, capsys):
+    def broken(contact, options):
+        raise ValueError("not enough values to unpack (expected 5, got 1)")
+
+    pipeline.run = broken
+    monkeypatch.setattr(commands, "load_bundle", lambda folder: fake_bundle())
+    monkeypatch.setattr(commands, "Pipeline", lambda bundle: pipeline)
+    assert main(command) == 2
+    shown = capsys.readouterr().err
+    assert shown.startswith("shipshape: expected the bundle to answer the built-in cluster, got ValueError: not ")
+    assert shown.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     "command", [["classify", "x.npy", "--bundle"], ["check", "--bundle"], ["bundle", "verify"]]
 )

@@ -22,7 +22,7 @@ from builders import (
     whole_hull,
 )
 from builders_models import CATALOGUE, untrained_bundle
-from shipshape.errors import Unprocessable
+from shipshape.errors import BundleError, Unprocessable
 from shipshape.pipeline import Pipeline
 from shipshape.types import Contact, ImageMethod, Options, Pose, Preset, Recognition
 from shipshape.validation import ContactLimits
@@ -267,3 +267,8 @@ def test_unknown_is_said_above_the_threshold_or_above_every_vessel(
 
     assert (said.unknown, said.vessel) == (unknown, "pilot_boat")
     assert said.probability == pytest.approx(probabilities[1])
+
+
+def test_a_bundle_that_does_not_fit_is_refused_before_any_contact() -> None:
+    with pytest.raises(BundleError, match="classes, for the 4 vessels of the catalogue"):
+        Pipeline(replace(untrained_bundle(), catalogue=(*CATALOGUE, replace(CATALOGUE[0], name="ferry"))))

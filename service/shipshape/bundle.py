@@ -24,7 +24,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from shipshape.errors import BundleError
 from shipshape.onnx_model import OnnxModel, Signature, TensorSpec
-from shipshape.types import ReferenceBox
+from shipshape.types import ImageMethod, ReferenceBox
 
 MANIFEST = "manifest.toml"
 FORMAT = 1
@@ -71,6 +71,29 @@ def load_bundle(path: Path) -> Bundle:
     )
 
 
+def check_fit(bundle: Bundle) -> None:
+    """Refuse a bundle whose catalogue, networks and parameters are each sound but do not belong together.
+
+    Raises:
+        BundleError: A classifier is of another number of classes than the catalogue, or a parameter that the
+            stages read is missing or of a type or range that they cannot use.
+    """
+    try:
+        _Parameters.model_validate({name: dict(table) for name, table in bundle.parameters.items()})
+    except ValidationError as error:
+        raise BundleError(_first_complaint(error, "parameters")) from error
+    known = len(bundle.catalogue)
+    classes = dict.fromkeys(("prior", "aligned", "inpainting", "spd2"), known + 1)  # and "unknown"
+    classes |= {f"spd2_{method}": known for method in ImageMethod}
+    for name in classes.keys() & bundle.models.keys():
+        last = bundle.models[name].signature.outputs[-1].shape[-1:]
+        if last not in ((), (-1,), (classes[name],)):
+            raise BundleError(
+                f"expected {name} to tell {classes[name]} classes, for the {known} vessels of the catalogue, "
+                f"got a network for {last[0]}"
+            )
+
+
 class _Table(dict[str, Any]):
     """A table of the manifest; a stage that misses a key in it learns that the bundle is to blame."""
 
@@ -112,6 +135,44 @@ class _ModelEntry(_Spec):
             inputs=tuple(entry.to_spec() for entry in self.inputs),
             outputs=tuple(entry.to_spec() for entry in self.outputs),
         )
+
+
+# What the stages read of [parameters.*]; whatever else stands there is free.
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class _StageTable(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True, strict=True)
+
+
+class _Common(_StageTable):
+    spd2_radius: _Positive
+    prior_temperature: _Positive
+    unknown_above: _Share
+
+
+class _Paper(_StageTable):
+    heading_std: _Positive
+    part_keypoints: Annotated[int, Field(ge=1, le=1000)]
+    part_sharpness: _Finite
+    empty_below: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class _Best(_StageTable):
+    looks: Annotated[int, Field(ge=1, le=10)]
+    heading_std_scale: _Positive
+    bow_temperature: _Positive
+    fusion_weights: Annotated[
+        list[_Finite], Field(min_length=4, max_length=4)
+    ]  # prior, look, bottleneck, restored
+
+
+class _Parameters(_StageTable):
+    common: _Common
+    paper: _Paper
+    best: _Best
 
 
 _Metres = Annotated[float, Field(gt=0, le=1000)]
@@ -165,9 +226,9 @@ def _parse_manifest(content: bytes) -> _ManifestSpec:
     return spec
 
 
-def _first_complaint(error: ValidationError) -> str:
+def _first_complaint(error: ValidationError, *above: str) -> str:
     first = error.errors(include_url=False)[0]
-    where = ".".join(map(str, first["loc"]))
+    where = ".".join(map(str, (*above, *first["loc"])))
     if first["type"] == "missing":
         return f"expected the key {where} in {MANIFEST}, got none"
     return f"expected another value of {where} in {MANIFEST}, got {first['input']!r:.80}: {first['msg']}"

@@ -21,7 +21,7 @@ from shipshape.classify import (
     readable,
     to_record,
 )
-from shipshape.errors import FileError
+from shipshape.errors import BundleError, FileError
 from shipshape.pipeline import Pipeline
 from shipshape.render import render_png
 from shipshape.sample import sample_contact
@@ -112,8 +112,18 @@ def _open(folder: Path | None) -> tuple[Bundle, Pipeline]:
 
 
 def _warm_up(pipeline: Pipeline, options: Options) -> None:
-    """The first run compiles and fills caches; its time says nothing about the next."""
-    pipeline.run(sample_contact(), options)
+    """The first run compiles and fills caches; its time says nothing about the next.
+
+    Raises:
+        BundleError: the built-in cluster got no answer, whatever the cause: it is a good one.
+    """
+    try:
+        pipeline.run(sample_contact(), options)
+    except BundleError:
+        raise
+    except Exception as error:
+        cause = " ".join(f"{type(error).__name__}: {error}".split())
+        raise BundleError(f"expected the bundle to answer the built-in cluster, got {cause:.160}") from error
 
 
 def _try_everything(pipeline: Pipeline) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from shipshape import frames, sight
 from shipshape.best import BestMethod
-from shipshape.bundle import UNKNOWN, Bundle
+from shipshape.bundle import UNKNOWN, Bundle, check_fit
 from shipshape.paper import PaperMethod
 from shipshape.stages import keypoints, prior, spd2
 from shipshape.stages.keypoints import KeypointParams
@@ -32,9 +32,14 @@ class Stage:
 
 
 class Pipeline:
-    """Cluster in, recognised and restored vessel out. Stateless and safe to share between threads."""
+    """Cluster in, recognised and restored vessel out. Stateless and safe to share between threads.
+
+    Raises:
+        BundleError: the bundle's catalogue, networks and parameters do not belong together.
+    """
 
     def __init__(self, bundle: Bundle, limits: ContactLimits | None = None) -> None:
+        check_fit(bundle)
         self.bundle = bundle
         self.limits = limits or ContactLimits()
         self._methods: dict[Preset, PaperMethod | BestMethod] = {
