@@ -31,7 +31,7 @@ def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
         raise ValueError("{} must hold one catalogue, but train has {} and validation {}".format(data, *names))
     shipped = networks.with_name("shipped")
     quantise_all(networks, shipped, Examples.read(data, "train"), seed=seed)
-    parameters = calibrated(partial_bundle(shipped, validation.catalogue), validation, seed=seed)
+    parameters, scores = calibrated(partial_bundle(shipped, validation.catalogue), validation, seed=seed)
     to.mkdir(parents=True, exist_ok=True)
     files = sorted(shipped.glob("*.onnx"))
     for file in files:
@@ -43,7 +43,7 @@ def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
         catalogue=validation.catalogue,
         models={file.stem: Path(file.name) for file in files},
         parameters=parameters,
-        scores={},
+        scores=scores,
     )
 
 
@@ -64,6 +64,7 @@ def main(argv: list[str] | None = None) -> None:
     print(f"bundle {bundle.name} {bundle.digest[:12]} with {len(bundle.models)} networks in {args.to}")
     for table, values in bundle.parameters.items():
         print(f"  {table}: {values}")
+    print(f"  scores: {bundle.scores}")
 
 
 if __name__ == "__main__":
