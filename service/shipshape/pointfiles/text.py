@@ -9,6 +9,7 @@ from jaxtyping import Float32
 from shipshape.errors import FileError
 from shipshape.pointfiles.columns import AXES, as_points, cause, listed
 
+_BOX_SIDES = {"length", "width", "height"}  # beside x, y, z: the middles of detected boxes, not points
 _MAX_BYTES = 64 * 2**20  # a line in memory takes several times its length in the file
 
 
@@ -54,6 +55,8 @@ def _find_axes(header: list[str], what: str) -> list[int]:
     names = [_plain(word) for word in header if word != "#"]
     if not set(AXES) <= set(names):
         raise FileError(f"expected numbers, or a header with the columns x, y, z in {what}, got {listed(header)}")
+    if set(names) >= _BOX_SIDES:
+        raise FileError(f"expected points in {what}, got a table of boxes, with the columns {listed(header)}")
     return [names.index(axis) for axis in AXES]
 
 
