@@ -20,7 +20,7 @@ serve: $(VENV)/.service ## run the service on loopback until Ctrl-C
 
 setup: $(VENV)/.dev ## create .venv with everything but torch
 
-test: $(VENV)/.dev ## run the whole suite
+test: $(VENV)/.dev ## run the whole suite, but the training tests only after `make torch`
 	@$(BIN)/python -m pytest -n 2
 
 check: lint types arch gen-check test ## everything a change must pass

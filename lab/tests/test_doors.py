@@ -1,0 +1,106 @@
+"""Clusters ray-cast from real hulls, through both doors of a real service with the shipped bundle."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import grpc
+import httpx
+import numpy as np
+import pytest
+
+from shipshape.bundle import load_bundle
+from shipshape.pipeline import Pipeline
+from shipshape.render import render_png
+from shipshape.serving.core import Model
+from shipshape.serving.service import Service
+from shipshape.settings import Settings
+from shipshape.v1 import shipshape_pb2 as pb
+from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
+from shipshape_lab.simulator.mesh_files import load_vessel
+from shipshape_lab.simulator.scan import Conditions, scan_vessel
+from shipshape_lab.simulator.sea import Placement
+from shipshape_lab.simulator.sensor import PANDAR64
+
+ROOT = Path(__file__).parents[2]
+MESHES = ROOT.parent / "shared" / "data" / "vessels"
+pytestmark = [
+    pytest.mark.skipif(not MESHES.is_dir(), reason="shared/data/vessels is not beside the repository"),
+    pytest.mark.skipif(not (ROOT / "models/manifest.toml").exists(), reason="the default bundle is not trained"),
+]
+PATIENCE = 30.0
+CASES = [
+    ("oc_tugboat", "tug", Placement(45.0, heading=0.6, bearing=0.4)),
+    ("bc_hurricane_rhib", "rhib", Placement(35.0, heading=-2.4, bearing=-1.2)),
+]
+
+
+@dataclass(frozen=True)
+class Doors:
+    rest: httpx.Client
+    stub: ShipshapeStub
+
+
+@pytest.fixture(scope="module")
+def doors():
+    bundle = load_bundle(ROOT / "models")
+    settings = Settings(rest_port=0, grpc_port=0, workers=1, default_timeout_ms=PATIENCE * 1e3)
+    service = Service(settings, render_png, on_death=lambda: pytest.fail("a door died"))
+    with ExitStack() as stack:
+        stack.callback(service.stop)
+        addresses = service.start()
+        service.open(Model(bundle, Pipeline(bundle)))
+        url = f"http://127.0.0.1:{addresses.rest_port}"
+        rest = stack.enter_context(httpx.Client(base_url=url, timeout=PATIENCE, trust_env=False))
+        channel = stack.enter_context(grpc.insecure_channel(f"127.0.0.1:{addresses.grpc_port}"))
+        yield Doors(rest, ShipshapeStub(channel))
+
+
+@pytest.mark.parametrize(("mesh", "kind", "placement"), CASES, ids=[mesh for mesh, *_ in CASES])
+def test_a_real_hull_gets_one_answer_through_both_doors(doors, mesh, kind, placement):
+    vessel = load_vessel(MESHES / f"{mesh}.ply")
+    seen = scan_vessel(
+        vessel, PANDAR64, placement=placement, conditions=Conditions(), rng=np.random.default_rng(0)
+    )
+    packed = seen.points_level.astype("<f4").tobytes()
+
+    by_grpc = through_grpc(doors, packed, placement.sensor_height)
+    by_rest = through_rest(doors, packed, placement.sensor_height)
+
+    assert (by_grpc["vessel"], by_grpc["unknown"]) == (by_rest["vessel"], by_rest["unknown"]) == (kind, False)
+    for number in ("heading", "probability", "bow_probability"):
+        assert by_grpc[number] == pytest.approx(by_rest[number], abs=1e-5)
+    assert abs(np.degrees(np.angle(np.exp(1j * (by_rest["heading"] - placement.heading))))) < 10.0
+    assert overlap(by_rest, placement, vessel.box) > 0.7
+
+
+def through_grpc(doors, packed, sensor_height):
+    contact = pb.Contact(points=packed, sensor_height_m=sensor_height)
+    said = doors.stub.Recognise(pb.RecogniseRequest(contact=contact), timeout=PATIENCE).recognition
+    return {
+        name: getattr(said, name) for name in ("vessel", "unknown", "heading", "probability", "bow_probability")
+    }
+
+
+def through_rest(doors, packed, sensor_height):
+    response = doors.rest.post(
+        "/v1/recognise",
+        params={"sensor_height_m": sensor_height},
+        content=packed,
+        headers={"content-type": "application/octet-stream"},
+    )
+    assert response.status_code == 200, response.text
+    return response.json()
+
+
+def overlap(said, placement, true_box):
+    """Intersection over union of the box said and the true one, from above."""
+    middle = placement.range_m * np.exp(1j * placement.bearing)
+    length, beam, _ = true_box
+    true = (middle.real, middle.imag), (length, beam), float(np.degrees(placement.heading))
+    box = said["box"]
+    found = box["center"][:2], (box["length"], box["beam"]), float(np.degrees(said["heading"]))
+    _, corners = cv2.rotatedRectangleIntersection(true, found)
+    common = 0.0 if corners is None else cv2.contourArea(cv2.convexHull(corners))
+    return common / (length * beam + box["length"] * box["beam"] - common)
