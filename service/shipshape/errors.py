@@ -9,7 +9,8 @@ ShipshapeError
 |-- Cancelled             executor -> stages: the caller left
 |-- NotReady              the service is starting or stopping
 |-- BundleError           files -> models: the bundle is missing, damaged or of another shape
-`-- FileError             file -> clusters: the file cannot be read
+|-- FileError             file -> clusters: the file cannot be read
+`-- SettingsError         environment or command line -> settings: unknown, or a value that cannot work
 
 A message is one sentence that says what was expected and what came. It is safe to show to a caller.
 """
@@ -53,3 +54,7 @@ class BundleError(ShipshapeError):
 
 class FileError(ShipshapeError):
     """A cluster file cannot be read."""
+
+
+class SettingsError(ShipshapeError):
+    """A setting is unknown or has a value that cannot work."""

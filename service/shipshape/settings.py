@@ -7,13 +7,11 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from shipshape.errors import ShipshapeError
+from shipshape.errors import SettingsError
+
+__all__ = ["PREFIX", "Settings", "SettingsError", "default_bundle", "load_settings"]
 
 PREFIX = "SHIPSHAPE_"
-
-
-class SettingsError(ShipshapeError):
-    """A setting is unknown or has a value that cannot work."""
 
 
 def default_bundle() -> Path:
@@ -76,9 +74,10 @@ class Settings(BaseSettings):
         description="Bytes of one request. Larger admits bigger scans, each held in memory while it is read.",
     )
     max_points: int = Field(
-        65536,
-        ge=1,
-        description="Points of one contact. Bounds the time one contact can take from all the others.",
+        16384,
+        ge=1000,  # the built-in contact of the warm-up
+        description="Points of one contact, at least 1000. Bounds the time one contact can take from all the "
+        "others.",
     )
     max_contacts: int = Field(256, ge=1, description="Contacts of one scan. They are queued all at once.")
     log_level: Literal["debug", "info", "warning", "error"] = Field(
@@ -88,7 +87,10 @@ class Settings(BaseSettings):
     @model_validator(mode="after")
     def _a_scan_fits_the_queue(self) -> "Settings":
         if self.queue_limit < self.max_contacts:
-            raise ValueError(f"expected at least max_contacts, {self.max_contacts}, got {self.queue_limit}")
+            raise ValueError(
+                f"expected {PREFIX}QUEUE_LIMIT to hold a whole scan, {PREFIX}MAX_CONTACTS = {self.max_contacts}, "
+                f"got {self.queue_limit}"
+            )
         return self
 
 
@@ -111,5 +113,7 @@ def load_settings(**overrides: Any) -> Settings:
 
 def _first_complaint(error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
-    name = ".".join(map(str, first["loc"])) or "queue_limit"
+    if not first["loc"]:  # of two settings together: the validator's own sentence; the input is all settings
+        return str(first["ctx"]["error"])
+    name = ".".join(map(str, first["loc"]))
     return f"expected another value of {PREFIX}{name.upper()}, got {first['input']!r:.80}: {first['msg']}"

@@ -5,7 +5,9 @@ import pytest
 from pydantic import ValidationError
 
 from shipshape import settings
-from shipshape.settings import Settings, SettingsError, load_settings
+from shipshape.errors import SettingsError
+from shipshape.sample import sample_contact
+from shipshape.settings import Settings, load_settings
 
 
 @pytest.fixture(autouse=True)
@@ -18,7 +20,7 @@ def test_defaults_are_safe_and_work():
     effective = load_settings()
     assert effective.host == "127.0.0.1"
     assert (effective.rest_port, effective.grpc_port) == (8080, 50051)
-    assert (effective.max_points, effective.max_contacts, effective.max_body_bytes) == (65536, 256, 16 * 2**20)
+    assert (effective.max_points, effective.max_contacts, effective.max_body_bytes) == (16384, 256, 16 * 2**20)
 
 
 def test_environment_below_overrides(monkeypatch):
@@ -44,8 +46,17 @@ def test_a_bad_value_refuses_the_start(monkeypatch, name, value):
 
 
 def test_a_scan_must_fit_the_queue():
-    with pytest.raises(SettingsError, match="expected at least max_contacts"):
-        load_settings(queue_limit=10)
+    with pytest.raises(SettingsError) as caught:
+        load_settings(queue_limit=1)
+    assert str(caught.value) == (
+        "expected SHIPSHAPE_QUEUE_LIMIT to hold a whole scan, SHIPSHAPE_MAX_CONTACTS = 256, got 1"
+    )
+
+
+def test_the_contact_of_the_warm_up_must_pass():
+    assert load_settings(max_points=len(sample_contact().points_level)).max_points == 1000
+    with pytest.raises(SettingsError, match="SHIPSHAPE_MAX_POINTS, got 999"):
+        load_settings(max_points=999)
 
 
 def test_settings_cannot_be_changed():
