@@ -1,13 +1,17 @@
-"""Starts that fail: one sentence on stderr, exit code 1, nothing left open."""
+"""Starts that fail: one sentence on stderr, the exit code that `shipshape --help` lists, nothing left open."""
 
+import os
 import re
 import signal
 import socket
+import threading
 
 import pytest
 
-from serving.fakes import PNG, FakeBundle, FakePipeline
+from serving.fakes import PATIENCE, PNG, FakeBundle, FakePipeline
+from shipshape.errors import BundleError
 from shipshape.serving import life
+from shipshape.serving.core import Core
 from shipshape.settings import Settings
 
 
@@ -28,7 +32,7 @@ def _fakes(monkeypatch):
 
 
 def test_a_missing_bundle(tmp_path, capsys):
-    assert life.serve(Settings(rest_port=0, grpc_port=0, bundle=tmp_path / "nowhere")) == 1
+    assert life.serve(Settings(rest_port=0, grpc_port=0, bundle=tmp_path / "nowhere")) == 2
     assert re.fullmatch(r"shipshape: expected .+nowhere.*, got .+\n", capsys.readouterr().err)
 
 
@@ -49,9 +53,35 @@ def test_a_bundle_that_fails_its_warm_up(monkeypatch, capsys):
 
 
 @pytest.mark.usefixtures("_fakes")
-def test_a_signal_during_the_start_is_not_lost(monkeypatch):
-    def warm_up_slowly(service, model):
-        signal.raise_signal(signal.SIGTERM)
+def test_a_bundle_that_turns_out_wrong_in_its_warm_up(monkeypatch):
+    def find_out(service, model):
+        raise BundleError("expected a network, got none")
 
-    monkeypatch.setattr(life.Service, "open", warm_up_slowly)
-    assert life.serve(Settings(rest_port=0, grpc_port=0)) == 0
+    monkeypatch.setattr(life.Service, "open", find_out)
+    assert life.serve(Settings(rest_port=0, grpc_port=0)) == 2
+
+
+@pytest.mark.usefixtures("_fakes")
+def test_a_signal_during_the_warm_up_ends_it_before_it_is_ready(monkeypatch, caplog):
+    entered, release = threading.Event(), threading.Event()
+    ready = []
+
+    def hang(pipeline, work):
+        entered.set()
+        assert release.wait(PATIENCE)
+
+    monkeypatch.setattr(FakePipeline, "_prior", hang)
+    monkeypatch.setattr(life, "LEAVE_S", 0.0)
+    monkeypatch.setattr(Core, "open", lambda core, model: ready.append(model))
+    caplog.set_level("INFO")
+    signaller = threading.Thread(target=lambda: entered.wait(PATIENCE) and os.kill(os.getpid(), signal.SIGTERM))
+    signaller.start()
+    try:
+        assert life.serve(Settings(rest_port=0, grpc_port=0)) == 0
+    finally:
+        release.set()
+    (warm_up,) = [thread for thread in threading.enumerate() if thread.name == "warm-up"] or [signaller]
+    warm_up.join(PATIENCE)
+    signaller.join()
+    assert ready == []
+    assert "ready: " not in caplog.text

@@ -4,54 +4,75 @@ import logging
 import queue
 import signal
 import sys
+import threading
 
 from shipshape.bundle import load_bundle
-from shipshape.errors import BundleError
+from shipshape.errors import BundleError, Cancelled
 from shipshape.pipeline import Pipeline
 from shipshape.render import render_png
 from shipshape.serving.core import Model
-from shipshape.serving.service import Service
+from shipshape.serving.service import Addresses, Service
 from shipshape.settings import Settings
 from shipshape.telemetry import configure_logging
 from shipshape.validation import ContactLimits
 
 _logger = logging.getLogger(__name__)
-DIED = 0  # in place of a signal's number
+OK, FAILED, UNUSABLE = 0, 1, 2  # exit codes, as `cli` lists them
+LEAVE_S = 2.0  # for a warm-up to reach the end of its stage; networks take milliseconds, compiling may take longer
+
+# What ends the wait of the main thread: a signal's number, a door that died (None), or a warm-up that failed.
+End = int | Exception | None
 
 
 def serve(settings: Settings) -> int:
     """Serve until SIGTERM or SIGINT.
 
     Returns:
-        The exit code: 0 after an orderly stop, 1 when the start failed or a door died. A failed start says why
-        in one sentence on stderr.
+        The exit code: 0 after an orderly stop, 2 when the bundle cannot be used, 1 when the start failed otherwise
+        or a door died. A failed start says why in one sentence on stderr.
     """
     configure_logging(settings.log_level)
     # Put of a SimpleQueue may interrupt its own get, which an Event's set may not: it is safe in a handler.
-    ends: queue.SimpleQueue[int] = queue.SimpleQueue()
+    ends: queue.SimpleQueue[End] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda received, frame: ends.put(received))
     try:
         bundle = load_bundle(settings.bundle)
         model = Model(bundle, Pipeline(bundle, ContactLimits(max_points=settings.max_points)))
-        service = Service(settings, render_png, on_death=lambda: ends.put(DIED))
+        service = Service(settings, render_png, on_death=lambda: ends.put(None))
         addresses = service.start()
     except (BundleError, OSError) as error:
-        return _failed(str(error))
+        return _failed(error, str(error))
     _logger.info("live on REST port %d, gRPC port %d", addresses.rest_port, addresses.grpc_port)
+    ended_by = _run(service, model, addresses, ends)
+    if isinstance(ended_by, Exception):
+        return _failed(ended_by, f"expected bundle {bundle.name} to answer the built-in contact, got {ended_by!r}")
+    _logger.info("stopped")
+    return FAILED if ended_by is None else OK
+
+
+def _run(service: Service, model: Model, addresses: Addresses, ends: "queue.SimpleQueue[End]") -> End:
+    """Ready, then stopped; what it was ended by. The warm-up has its own thread: a signal must not wait for it."""
+    opening = threading.Thread(target=_open, args=(service, model, addresses, ends), name="warm-up", daemon=True)
+    opening.start()
     try:
-        service.open(model)
-        _logger.info("ready: %s, bundle %s (%s)", addresses, bundle.name, bundle.digest)
-        ended_by = ends.get()
-    except Exception as error:
-        _logger.exception("the warm-up failed")
-        return _failed(f"expected bundle {bundle.name} to answer the built-in contact, got {error!r}")
+        return ends.get()
     finally:
         service.stop()
-    _logger.info("stopped")
-    return 1 if ended_by == DIED else 0
+        opening.join(LEAVE_S)
 
 
-def _failed(sentence: str) -> int:
+def _open(service: Service, model: Model, addresses: Addresses, ends: "queue.SimpleQueue[End]") -> None:
+    try:
+        service.open(model)
+        _logger.info("ready: %s, bundle %s (%s)", addresses, model.bundle.name, model.bundle.digest)
+    except Cancelled:
+        _logger.info("stopped before it was ready")
+    except Exception as error:
+        _logger.exception("the warm-up failed")
+        ends.put(error)
+
+
+def _failed(error: Exception, sentence: str) -> int:
     sys.stderr.write(f"shipshape: {sentence}\n")
-    return 1
+    return UNUSABLE if isinstance(error, BundleError) else FAILED

@@ -4,6 +4,7 @@ live: the doors listen and refuse -> ready: every stage is warm -> stopping: no 
 """
 
 import logging
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 import cv2
 from prometheus_client import CollectorRegistry
 
+from shipshape.errors import Cancelled
 from shipshape.executor import Executor, usable_cores
 from shipshape.serving.core import Core, Model, Render
 from shipshape.serving.encoding import Limits
@@ -54,6 +56,8 @@ class Service:
         limits = Limits(settings.max_body_bytes, settings.max_points, settings.max_contacts)
         timeouts = Timeouts(settings.default_timeout_ms, settings.budget_ms)
         self._settings = settings
+        self._turn = threading.Lock()  # to ready, or to stopping
+        self._stopping = False
         self._render = render
         self._metrics = Metrics(CollectorRegistry())
         self.executor = Executor(workers, settings.queue_limit, on_stage=self._metrics.observe_stage)
@@ -73,18 +77,28 @@ class Service:
             raise
 
     def open(self, model: Model) -> None:
-        """Warm `model` up, then take requests; raises whatever the warm-up raises."""
-        warm_up(model, self._render)
-        self._metrics.set_bundle(model.bundle.name, model.bundle.digest)
-        self._core.open(model)
-        self._grpc.open()
-        self._metrics.set_ready(True)
+        """Warm `model` up, then take requests.
+
+        Raises:
+            Cancelled: `stop` was called before the service was ready.
+            Exception: Whatever the warm-up raises.
+        """
+        warm_up(model, self._render, lambda: self._stopping)
+        with self._turn:
+            if self._stopping:
+                raise Cancelled("expected to take requests after the warm-up, got a signal to stop")
+            self._metrics.set_bundle(model.bundle.name, model.bundle.digest)
+            self._core.open(model)
+            self._grpc.open()
+            self._metrics.set_ready(True)
 
     def stop(self) -> None:
         """Not ready, accept no more, let what is under way end, for up to `drain_s` seconds."""
-        self._core.close()
-        self._grpc.close()
-        self._metrics.set_ready(False)
+        with self._turn:
+            self._stopping = True
+            self._core.close()
+            self._grpc.close()
+            self._metrics.set_ready(False)
         end = time.monotonic() + self._settings.drain_s
         self._grpc.begin_stop(self._settings.drain_s)  # both doors drain at the same time
         self._rest.stop(self._settings.drain_s)
