@@ -1,5 +1,7 @@
 """Every metric and the log format, in one place; nothing of it leaves the machine unless someone asks for it."""
 
+import asyncio
+import collections
 import json
 import logging
 import sys
@@ -15,8 +17,8 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info
 # Seconds. Stages lie between 10 us and the budget; answers around the budget of 50 ms.
 STAGE_BUCKETS = (5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3, 25e-3, 50e-3, 0.1, 0.4, 1.6)
 REQUEST_BUCKETS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 25e-3, 35e-3, 50e-3, 70e-3, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-OK = "ok"
-SINGLE = "recognise"  # the method whose request is one contact
+OK, CANCELLED, INTERNAL = "ok", "cancelled", "internal"
+SINGLE, SCAN = "recognise", "recognise_scan"  # the methods whose request is one contact, and many
 
 request_id: ContextVar[str] = ContextVar("request_id", default="")
 _logger = logging.getLogger(__name__)
@@ -35,6 +37,7 @@ class Outcome:
     """How a request ended: "ok" or the kind of its error. The door writes it."""
 
     kind: str = OK
+    contacts: int = 0  # that the request brought, as soon as it is known
 
 
 class Metrics:
@@ -68,8 +71,8 @@ class Metrics:
 
     def count_contacts(self, door: str, outcomes: Iterable[str]) -> None:
         """Contacts of a scan were answered ("ok") or refused (the kind of the error)."""
-        for outcome in outcomes:
-            self._contacts.labels(door, outcome).inc()
+        for outcome, count in collections.Counter(outcomes).items():
+            self._contacts.labels(door, outcome).inc(count)
 
     def watch_queue(self, depth: Callable[[], float], running: Callable[[], float]) -> None:
         """Read both gauges from the executor whenever somebody scrapes."""
@@ -86,19 +89,27 @@ class Metrics:
 
     @contextmanager
     def request(self, door: str, method: str) -> Iterator[Outcome]:
-        """Time one request; its outcome is what the block leaves in the yielded object."""
-        outcome = Outcome()
+        """Time one request; its outcome is what the block leaves in the yielded object.
+
+        Contacts of an answered scan are counted one by one, by `count_contacts`; those of a scan that was refused
+        as a whole are counted here, each with the kind of the refusal.
+        """
+        outcome = Outcome(contacts=int(method == SINGLE))
         start = time.perf_counter()
         in_flight = self._in_flight.labels(door)
         in_flight.inc()
         try:
             yield outcome
+        except BaseException as error:
+            if outcome.kind == OK:  # nobody has said how it ended: broken off, or by mistake
+                outcome.kind = CANCELLED if isinstance(error, asyncio.CancelledError) else INTERNAL
+            raise
         finally:
             seconds = time.perf_counter() - start
             in_flight.dec()
             self._request.labels(door, method, outcome.kind).observe(seconds)
-            if method == SINGLE:
-                self.count_contacts(door, [outcome.kind])
+            if method == SINGLE or outcome.kind != OK:
+                self.count_contacts(door, [outcome.kind] * outcome.contacts)
             _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
 
 

@@ -35,6 +35,14 @@ def test_the_bodies_of_the_contract_are_those_that_work(doors):
     assert response.status_code == 200
 
 
+def test_what_is_no_json_is_not_said_to_be(doors):
+    paths = doors.rest.get("/openapi.json").json()["paths"]
+    assert list(paths["/metrics"]["get"]["responses"]["200"]["content"]) == ["text/plain"]
+    assert doors.rest.get("/metrics").headers["content-type"].startswith("text/plain")
+    assert "415" in paths["/v1/recognise"]["post"]["responses"]
+    assert "415" in paths["/v1/scan"]["post"]["responses"]
+
+
 def _references(node):
     if isinstance(node, dict):
         if isinstance(node.get("$ref"), str):

@@ -135,7 +135,7 @@ def test_unknown_method(doors, field):
 def test_bad_fields(doors, field, value):
     by_grpc = through_grpc(doors, GOOD, **{field: value})
     assert by_grpc == through_rest(doors, GOOD.tobytes(), **{field: value})
-    assert isinstance(by_grpc[0], FaultKind)
+    assert by_grpc[0] is (FaultKind.INVALID_INPUT if field == "contact_id" else FaultKind.UNPROCESSABLE)
 
 
 def test_internal_errors(doors):
@@ -159,6 +159,14 @@ def test_more_bytes_than_the_limit(doors):
     assert by_grpc[1].startswith("expected at most 16777216 bytes a request, got ")
 
 
+def test_more_bytes_than_grpc_itself_reads(doors):
+    """No shipshape-error tells it from a full queue: the comments of the contract say so."""
+    limit = doors.stub.GetModelInfo(pb.GetModelInfoRequest(), timeout=PATIENCE).limits.max_body_bytes
+    call = doors.stub.Recognise.future(request(bytes(limit + 4 * 2**20)), timeout=PATIENCE)
+    assert call.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+    assert "shipshape-error" not in dict(call.trailing_metadata())
+
+
 BAD_JSON = {
     "not JSON": (b"points", "expected JSON, got 6 bytes"),
     "not an object": (b"[1, 2]", "expected the body to be a valid dictionary"),
@@ -169,6 +177,17 @@ BAD_JSON = {
     "four columns": (b'{"points": [[1, 2, 3], [1, 2, 3, 4]]}', "points[1], got a list of 4"),
     "flat": (b'{"points": [1, 2, 3]}', "points[0], got a number"),
     "text": (b'{"points": [["1", "2", "3"]]}', "expected only numbers"),
+    "true among numbers": (b'{"points": [[1, 2, true]]}', "expected only numbers"),
+    "all true": (b'{"points": [[true, true, true]]}', "expected only numbers"),
+    "true for a number": (
+        b'{"points": [], "sensor_height_m": true}',
+        "sensor_height_m to be a valid number, got True",
+    ),
+    "text for a number": (
+        b'{"points": [], "sensor_height_m": "3"}',
+        "sensor_height_m to be a valid number, got '3'",
+    ),
+    "a number for true": (b'{"points": [], "include_png": 1}', "include_png to be a valid boolean, got 1"),
     "null": (b'{"points": [[1, 2, null]]}', "expected only numbers"),
     "lists in rows": (b'{"points": [[1, 2, [3]]]}', "expected only numbers"),
     "points as text": (b'{"points": "x"}', "a list of [x, y, z], got a string"),
@@ -187,7 +206,9 @@ def test_malformed_json(doors, name):
     assert message in detail
 
 
-@pytest.mark.parametrize("literal", [b"NaN", b"Infinity", b"-Infinity", b"1e400", b"1e39"])
+@pytest.mark.parametrize(
+    "literal", [b"NaN", b"Infinity", b"-Infinity", b"1e400", b"1e39", b"1" * 39 + b"0", b"-" + b"9" * 400]
+)
 def test_not_finite_in_json(doors, literal):
     body = b'{"points": [' + b"[1, 2, 3], " * 12 + b"[1, " + literal + b", 3]]}"
     response = doors.rest.post("/v1/recognise", content=body, headers={"content-type": "application/json"})

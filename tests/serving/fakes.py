@@ -1,6 +1,8 @@
 """A pipeline that does what a contact's id says, a service around it, and clients of both its doors."""
 
+import os
 import threading
+import time
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -31,6 +33,8 @@ PATIENCE = 10.0
 DIGEST = "ab" * 32
 PNG = b"\x89PNG fake"
 SECRET = "the secret of the stage"
+HEAD = "POST /v1/recognise HTTP/1.1\r\nHost: x\r\nContent-Type: application/octet-stream\r\nContent-Length: {}\r\n"
+HALF = HEAD.format(4800).encode() + b"\r\nabc"
 
 
 @dataclass(frozen=True)
@@ -180,6 +184,24 @@ def running(*, opened=True, **settings):
         rest.close()
         channel.close()
         service.stop()
+
+
+def until(condition):
+    """Give way until another thread has made it so."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if condition():
+            return
+        os.sched_yield()
+    pytest.fail("it never came true")
+
+
+def refuses(doors):
+    try:
+        doors.ask_grpc(cluster())
+    except grpc.RpcError as error:
+        return error.code() is grpc.StatusCode.UNAVAILABLE
+    return False
 
 
 @pytest.fixture(scope="module")

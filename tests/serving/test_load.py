@@ -1,8 +1,6 @@
 """Overload, deadlines, callers that leave, and draining: through both doors."""
 
-import os
 import socket
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import grpc
@@ -11,7 +9,7 @@ import pytest
 from grpc_health.v1 import health_pb2
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
-from serving.fakes import PATIENCE, cluster, request, rows, running
+from serving.fakes import HALF, PATIENCE, cluster, refuses, request, rows, running, until
 from shipshape.v1 import shipshape_pb2 as pb
 
 POINTS = cluster()
@@ -38,16 +36,6 @@ def fill(doors):
     call = doors.stub.RecogniseScan.future(pb.RecogniseScanRequest(contacts=contacts), timeout=PATIENCE)
     until(lambda: doors.service.executor.queue_depth == 2)
     return call
-
-
-def until(condition):
-    """Give way until another thread has made it so."""
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        if condition():
-            return
-        os.sched_yield()
-    pytest.fail("it never came true")
 
 
 def test_a_full_queue_refuses_at_once_and_serves_again_later():
@@ -171,19 +159,11 @@ def test_a_watcher_of_health_does_not_hold_up_the_stop(pool):
 def test_a_caller_that_leaves_half_way_is_no_internal_error(caplog):
     with running() as doors:
         with socket.create_connection(("127.0.0.1", doors.addresses.rest_port)) as client:
-            client.sendall(b"POST /v1/recognise HTTP/1.1\r\nHost: x\r\nContent-Length: 4800\r\n\r\nabc")
+            client.sendall(HALF)
             until(lambda: 'shipshape_in_flight{door="rest"} 1.0' in doors.rest.get("/metrics").text)
         cancelled = 'method="recognise",outcome="cancelled"} 1.0'
         until(lambda: cancelled in doors.rest.get("/metrics").text)
     assert "internal error" not in caplog.text
-
-
-def refuses(doors):
-    try:
-        doors.ask_grpc(POINTS[:3])
-    except grpc.RpcError as error:
-        return error.code() is grpc.StatusCode.UNAVAILABLE
-    return False
 
 
 def test_thousands_of_mixed_requests_leave_nothing_behind(pool):

@@ -2,12 +2,14 @@ import base64
 import json
 
 import cv2
+import grpc
 import numpy as np
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from serving.fakes import DIGEST, PNG, SECRET, cluster, image_methods, rows, running
+from serving.fakes import DIGEST, PATIENCE, PNG, SECRET, cluster, image_methods, rows, running
 from shipshape.serving.rest.schemas import ModelAnswer, RecognitionAnswer, ScanAnswer
+from shipshape.v1 import shipshape_pb2 as pb
 
 POINTS = cluster()
 PACKED = {"content-type": "application/octet-stream"}
@@ -129,6 +131,15 @@ def test_the_frameworks_refusals_are_problems_too(doors, method, path, status, d
     assert response.json()["detail"] == detail
 
 
+def test_the_frameworks_refusals_have_an_id(doors):
+    given = {"X-Request-Id": "voyage-7"}
+    for method, path in (("GET", "/nowhere"), ("DELETE", "/livez"), ("POST", "/v1/recognise")):
+        response = doors.rest.request(method, path, headers=given)
+        assert response.headers["X-Request-Id"] == response.json()["request_id"] == "voyage-7"
+        first, second = (doors.rest.request(method, path).json()["request_id"] for _ in range(2))
+        assert "" != first != second
+
+
 def test_another_media_type_is_refused(doors):
     response = doors.rest.post("/v1/recognise", content=b"x", headers={"content-type": "text/csv"})
     assert response.status_code == 415
@@ -180,7 +191,21 @@ def test_health_and_readiness_are_two_things():
         assert doors.rest.get("/readyz").status_code == 503
         refused = doors.ask_rest(POINTS)
         assert (refused.status_code, refused.json()["error"]) == (503, "not_ready")
+        assert doors.rest.get("/readyz").json()["request_id"] != refused.json()["request_id"] != ""
     assert json.loads(refused.text)["detail"].startswith("expected a running service")
+
+
+def test_contacts_of_a_scan_that_is_refused_as_a_whole_are_counted():
+    contacts = [{"points": rows(POINTS)}] * 3
+    with running(max_contacts=2, queue_limit=2) as doors:
+        assert doors.rest.post("/v1/scan", json={"contacts": contacts}).status_code == 413
+        assert doors.rest.post("/v1/scan", json={"contacts": contacts[:2], "bundle": "other"}).status_code == 400
+        with pytest.raises(grpc.RpcError):
+            doors.stub.RecogniseScan(pb.RecogniseScanRequest(contacts=[pb.Contact()] * 5), timeout=PATIENCE)
+        text = doors.rest.get("/metrics").text
+    assert 'shipshape_contacts_total{door="rest",outcome="too_large"} 3.0' in text
+    assert 'shipshape_contacts_total{door="rest",outcome="invalid_input"} 2.0' in text
+    assert 'shipshape_contacts_total{door="grpc",outcome="too_large"} 5.0' in text
 
 
 def test_metrics_tell_of_every_outcome():

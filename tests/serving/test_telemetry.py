@@ -1,3 +1,4 @@
+import asyncio
 import json
 import logging
 import sys
@@ -51,6 +52,16 @@ def test_a_request_is_timed_though_it_fails():
     labels = {"door": "rest", "method": "recognise", "outcome": "internal"}
     assert metrics.registry.get_sample_value("shipshape_request_seconds_count", labels) == 1
     assert metrics.registry.get_sample_value("shipshape_in_flight", {"door": "rest"}) == 0
+
+
+@pytest.mark.parametrize(("error", "kind"), [(asyncio.CancelledError, "cancelled"), (MemoryError, "internal")])
+def test_a_request_that_was_broken_off_is_not_ok(error, kind):
+    metrics = Metrics(CollectorRegistry())
+    with pytest.raises(error), metrics.request("rest", "recognise"):
+        raise error
+    labels = {"door": "rest", "method": "recognise", "outcome": kind}
+    assert metrics.registry.get_sample_value("shipshape_request_seconds_count", labels) == 1
+    assert metrics.registry.get_sample_value("shipshape_contacts_total", {"door": "rest", "outcome": kind}) == 1
 
 
 def test_two_services_in_one_process_do_not_share_metrics():

@@ -10,6 +10,9 @@ from typing import Any, Protocol, runtime_checkable
 from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
 from shipshape.executor import Executor, Stage, Task, Ticket
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
+from shipshape.serving.faults import Fault, fault_of
+from shipshape.serving.timing import summed
+from shipshape.telemetry import OK, Metrics
 from shipshape.types import Contact, Options, Recognition, ReferenceBox
 
 Render = Callable[[Contact, Recognition], bytes]  # -> PNG
@@ -113,6 +116,20 @@ class Scan:
         return outcomes
 
 
+def conclude(scan: Scan, door: str, metrics: Metrics) -> tuple[list[Answer | Fault], dict[str, float]]:
+    """Wait for a scan and count its contacts.
+
+    Returns:
+        An answer or a fault for each contact, and the milliseconds of each stage over all of them.
+
+    Raises:
+        DeadlineExceeded, Cancelled, NotReady: As `Scan.outcomes`.
+    """
+    outcomes = [fault_of(end) if isinstance(end, Exception) else end for end in scan.outcomes()]
+    metrics.count_contacts(door, (end.kind if isinstance(end, Fault) else OK for end in outcomes))
+    return outcomes, summed(end.recognition for end in outcomes if not isinstance(end, Fault))
+
+
 class Core:
     """Checks, queues and answers; ready once it has a model, until it is told to stop.
 
@@ -144,11 +161,11 @@ class Core:
         self._model = None
 
     def deadline_in(self, seconds: float) -> float:
-        """The deadline `seconds` from now, on the clock that `recognise` expects."""
+        """The moment `seconds` from now on the executor's clock, as `submit` and `submit_scan` take it."""
         return self._executor.clock() + seconds
 
     def model(self) -> Model:
-        """The running model.
+        """The running model, for a request to take at its start: what began before a stop is still answered.
 
         Raises:
             NotReady: The service is starting or stopping.
@@ -157,24 +174,29 @@ class Core:
             raise NotReady(self._refusal)
         return model
 
-    def submit(self, contact: Contact, wishes: Wishes, deadline: float) -> Ticket[Answer]:
+    def submit(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Ticket[Answer]:
         """Queue one contact; a ticket for its answer.
 
         Args:
+            model: From `model`.
             contact: Level frame.
             wishes: How to compute, and whether to draw.
             deadline: From `deadline_in`.
 
         Raises:
             InvalidInput: Another bundle than the running one, or points that cannot be one vessel's cluster.
-            Overloaded, DeadlineExceeded, NotReady: No place, no time, or no model.
+            Overloaded, DeadlineExceeded, NotReady: No place, no time, or stopped for good.
         """
-        return self._executor.submit(self._task(self._wished_model(wishes, deadline), contact, wishes, deadline))
+        self._check(model, wishes, deadline)
+        return self._executor.submit(self._task(model, contact, wishes, deadline))
 
-    def submit_scan(self, contacts: Sequence[Contact | InvalidInput], wishes: Wishes, deadline: float) -> Scan:
+    def submit_scan(
+        self, model: Model, contacts: Sequence[Contact | InvalidInput], wishes: Wishes, deadline: float
+    ) -> Scan:
         """Queue all acceptable contacts of a scan, or none; the others keep their own error.
 
         Args:
+            model: From `model`.
             contacts: Level frame; an error stands for a contact that could not even be decoded.
             wishes: Hold for all contacts.
             deadline: From `deadline_in`, for all contacts.
@@ -183,7 +205,7 @@ class Core:
             InvalidInput, Overloaded, DeadlineExceeded, NotReady: What concerns the scan as a whole.
         """
         check_contacts(len(contacts), self.limits)
-        model = self._wished_model(wishes, deadline)
+        self._check(model, wishes, deadline)
         entries: list[Task[Any, Answer] | Exception] = []
         for contact in contacts:
             try:
@@ -195,24 +217,12 @@ class Core:
         tickets = iter(self._executor.submit_all([entry for entry in entries if isinstance(entry, Task)]))
         return Scan([next(tickets) if isinstance(entry, Task) else entry for entry in entries])
 
-    def recognise(self, contact: Contact, wishes: Wishes, deadline: float) -> Answer:
-        """The answer for one contact, waited for; raises as `submit` does, and what the stages raise."""
-        return self.submit(contact, wishes, deadline).result()
-
-    def recognise_scan(
-        self, contacts: Sequence[Contact | InvalidInput], wishes: Wishes, deadline: float
-    ) -> list[Answer | Exception]:
-        """An answer or an error for each contact, waited for; raises as `submit_scan` and `Scan.outcomes` do."""
-        return self.submit_scan(contacts, wishes, deadline).outcomes()
-
-    def _wished_model(self, wishes: Wishes, deadline: float) -> Model:
-        model = self.model()
+    def _check(self, model: Model, wishes: Wishes, deadline: float) -> None:
         if wishes.bundle not in ("", model.bundle.name, model.bundle.digest):
             expected = f"{model.bundle.name} ({model.bundle.digest})"
             raise InvalidInput(f"expected bundle {expected}, got {wishes.bundle:.80}")
         if self._executor.clock() >= deadline:
             raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
-        return model
 
     def _task(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Task[Any, Answer]:
         def finish(work: Any, stage_ms: Mapping[str, float]) -> Answer:

@@ -8,6 +8,7 @@ import binascii
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ class Limits:
     """What one request may bring."""
 
     max_body_bytes: int = 16 * 2**20
-    max_points: int = 65536  # of one contact
+    max_points: int = 16384  # of one contact
     max_contacts: int = 256  # of one scan
 
 
@@ -67,7 +68,7 @@ def points_from_base64(text: str, limits: Limits) -> Float32[np.ndarray, "n 3"]:
 
 
 def points_from_rows(rows: Any, limits: Limits) -> Float32[np.ndarray, "n 3"]:
-    """Rows of three numbers, level frame, metres. Not-a-number and infinity pass: the pipeline refuses them.
+    """Rows of three numbers, level frame, metres. What is not finite in float32 passes: the pipeline refuses it.
 
     Raises:
         InvalidInput: Not rows of three numbers each.
@@ -91,17 +92,13 @@ def make_contact(
     sensor_height_m: float | None = None,
     own_true_heading_deg: float | None = None,
 ) -> Contact:
-    """The contact, its numbers beside the points checked.
+    """The contact; whether its numbers can be true is the pipeline's to check.
 
     Raises:
-        InvalidInput: An id too long, a height not above 0 m, or a heading that is not finite.
+        InvalidInput: An id too long.
     """
     if len(contact_id) > MAX_ID_LENGTH:
         raise InvalidInput(f"expected at most {MAX_ID_LENGTH} characters in contact_id, got {len(contact_id)}")
-    if sensor_height_m is not None and not 0 < sensor_height_m < math.inf:
-        raise InvalidInput(f"expected sensor_height_m to be above 0 m and finite, got {sensor_height_m}")
-    if own_true_heading_deg is not None and not math.isfinite(own_true_heading_deg):
-        raise InvalidInput(f"expected own_true_heading_deg to be finite, got {own_true_heading_deg}")
     return Contact(points_level, contact_id, sensor_height_m, own_true_heading_deg)
 
 
@@ -140,15 +137,23 @@ def _check_points(count: int, limits: Limits) -> None:
         raise TooLarge(f"expected at most {limits.max_points} points in a contact, got {count}")
 
 
-def _to_float32(rows: list[Any]) -> Float32[np.ndarray, "n 3"]:
-    try:
-        array = np.asarray(rows)
-    except ValueError:  # lists inside the rows
-        array = np.empty(0)
-    if array.dtype.kind not in "iuf" or array.ndim != 2:
+def _to_float32(rows: list[list[Any]]) -> Float32[np.ndarray, "n 3"]:
+    # By type, not by what numpy makes of it: true and false would become 1 and 0 among numbers.
+    if not set(map(type, chain.from_iterable(rows))) <= {int, float}:
         raise InvalidInput("expected only numbers in points, got something else among them")
+    try:
+        array = np.asarray(rows, np.float64)
+    except OverflowError:  # an integer beyond float64
+        array = np.asarray([[_to_float(number) for number in row] for row in rows], np.float64)
     with np.errstate(over="ignore"):  # beyond float32 is infinite, which the pipeline refuses
         return array.astype(np.float32)
+
+
+def _to_float(number: int | float) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
 
 
 def _kind(value: Any) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from shipshape.types import Recognition
 
-LONGEST_MS = 3_600_000.0  # a longer deadline is none: gRPC hands out centuries when the caller set nothing
+LONGEST_MS = 3_600_000.0  # that any request may take, whatever its caller says
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from google.protobuf.message import DecodeError
 from shipshape.errors import InvalidInput
 from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import FaultKind, fault_of
-from shipshape.telemetry import SINGLE, Metrics, new_request_id, request_id
+from shipshape.telemetry import SCAN, SINGLE, Metrics, new_request_id, request_id
 
 STATUS = {
     FaultKind.INVALID_INPUT: grpc.StatusCode.INVALID_ARGUMENT,
@@ -21,7 +21,7 @@ STATUS = {
     FaultKind.NOT_READY: grpc.StatusCode.UNAVAILABLE,
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
-METHODS = {"Recognise": SINGLE, "RecogniseScan": "recognise_scan", "GetModelInfo": "model_info"}
+METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info"}
 PREFIX = "/shipshape.v1.Shipshape/"
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
 
@@ -51,7 +51,10 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
             with self._metrics.request("grpc", method) as outcome:
                 try:
                     check_body(len(raw), self._limits)
-                    return behaviour(_parsed(raw, parse), context)
+                    message = _parsed(raw, parse)
+                    if method == SCAN:
+                        outcome.contacts = len(message.contacts)
+                    return behaviour(message, context)
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind

@@ -5,17 +5,17 @@ from concurrent.futures import ThreadPoolExecutor
 
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
-from grpc_reflection.v1alpha import reflection
 
 from shipshape.serving.core import Core
 from shipshape.serving.grpc.guard import Guard
+from shipshape.serving.grpc.reflection import PLACES, add_reflection
 from shipshape.serving.grpc.servicer import Servicer
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2, shipshape_pb2_grpc
 
 SERVICE = shipshape_pb2.DESCRIPTOR.services_by_name["Shipshape"].full_name
-SPARE_THREADS = 8  # for health, reflection and the refusals of a full queue
+SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and for reflection streams
 MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that the refusal is ours, in one sentence
 
 
@@ -27,7 +27,8 @@ class GrpcDoor:
         metrics: Told of every request.
         timeouts: Deadline of callers that set none.
         waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
-            executor's queue, which is bounded and refuses, is the only place to wait in.
+            executor's queue, which is bounded and refuses, is where they wait; reflection streams, which hold
+            a thread each as well, are bounded for the same reason.
     """
 
     def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, *, waiting: int) -> None:
@@ -45,8 +46,7 @@ class GrpcDoor:
         servicer = Servicer(core, metrics, timeouts)
         shipshape_pb2_grpc.add_ShipshapeServicer_to_server(servicer, self._server)  # type: ignore[no-untyped-call]
         health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
-        names = (SERVICE, health.SERVICE_NAME, reflection.SERVICE_NAME)
-        reflection.enable_server_reflection(names, self._server)
+        add_reflection((SERVICE, health.SERVICE_NAME), self._server)
         self.close()
 
     def start(self, host: str, port: int) -> int:

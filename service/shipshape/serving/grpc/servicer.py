@@ -7,15 +7,16 @@ from typing import Any
 import grpc
 
 from shipshape.executor import Ticket
-from shipshape.serving.core import Core
+from shipshape.serving.core import Core, conclude
 from shipshape.serving.encoding import check_contacts
-from shipshape.serving.faults import Fault, fault_of
 from shipshape.serving.grpc import convert
 from shipshape.serving.grpc.guard import set_trailing
-from shipshape.serving.timing import LONGEST_MS, Timeouts, server_timing, summed
-from shipshape.telemetry import OK, Metrics
+from shipshape.serving.timing import LONGEST_MS, Timeouts, server_timing
+from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.v1 import shipshape_pb2_grpc as pb_grpc
+
+NEVER_S = 365 * 86400.0  # gRPC hands out centuries when the caller set no deadline
 
 
 class Servicer(pb_grpc.ShipshapeServicer):
@@ -28,9 +29,10 @@ class Servicer(pb_grpc.ShipshapeServicer):
 
     def Recognise(self, request: pb.RecogniseRequest, context: grpc.ServicerContext) -> pb.RecogniseResponse:
         """One contact."""
+        model = self._core.model()
         wishes = convert.to_wishes(request.options)
         contact = convert.to_contact(request.contact, self._core.limits)
-        ticket = self._core.submit(contact, wishes, self._deadline(context))
+        ticket = self._core.submit(model, contact, wishes, self._deadline(context))
         _cancel_with(context, [ticket])
         answer = ticket.result()
         _set_timing(context, answer.recognition.stage_ms)
@@ -40,14 +42,14 @@ class Servicer(pb_grpc.ShipshapeServicer):
         self, request: pb.RecogniseScanRequest, context: grpc.ServicerContext
     ) -> pb.RecogniseScanResponse:
         """Many contacts of one scan."""
+        model = self._core.model()
         wishes = convert.to_wishes(request.options)
         check_contacts(len(request.contacts), self._core.limits)
         contacts = convert.to_contacts(request.contacts, self._core.limits)
-        scan = self._core.submit_scan(contacts, wishes, self._deadline(context))
+        scan = self._core.submit_scan(model, contacts, wishes, self._deadline(context))
         _cancel_with(context, scan.tickets)
-        outcomes = [fault_of(end) if isinstance(end, Exception) else end for end in scan.outcomes()]
-        self._metrics.count_contacts("grpc", (end.kind if isinstance(end, Fault) else OK for end in outcomes))
-        _set_timing(context, summed(end.recognition for end in outcomes if not isinstance(end, Fault)))
+        outcomes, stage_ms = conclude(scan, "grpc", self._metrics)
+        _set_timing(context, stage_ms)
         return convert.from_outcomes((contact.contact_id for contact in request.contacts), outcomes, wishes)
 
     def GetModelInfo(
@@ -66,9 +68,9 @@ class Servicer(pb_grpc.ShipshapeServicer):
 
     def _deadline(self, context: grpc.ServicerContext) -> float:
         remaining = context.time_remaining()
-        if remaining is None or remaining > LONGEST_MS / 1e3:
+        if remaining is None or remaining > NEVER_S:
             remaining = self._timeouts.default_ms / 1e3
-        return self._core.deadline_in(remaining)
+        return self._core.deadline_in(min(remaining, LONGEST_MS / 1e3))
 
 
 def _cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -> None:

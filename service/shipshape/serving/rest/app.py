@@ -4,6 +4,7 @@ from importlib.metadata import version
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.responses import PlainTextResponse
 
 from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
@@ -34,12 +35,13 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts) -> FastAPI:
     def add(path: str, handler: Any, *methods: str, **more: Any) -> None:
         app.add_api_route(path, handler, methods=list(methods), operation_id=handler.__name__, **more)
 
+    refusals |= contract.unsupported()
     add("/v1/recognise", routes.recognise, "POST", **_api(RecognitionAnswer, refusals, contract.recognise_extra()))
     add("/v1/scan", routes.scan, "POST", **_api(ScanAnswer, refusals, contract.scan_extra()))
     add("/v1/model", routes.model, "GET", **_api(ModelAnswer, not_ready, None))
     add("/livez", routes.live, "GET")
     add("/readyz", routes.ready, "GET", responses=not_ready)
-    add("/metrics", routes.metrics, "GET")
+    add("/metrics", routes.metrics, "GET", response_class=PlainTextResponse)
     add_handlers(app)
     contract.add_contract(app)
     return app

@@ -15,6 +15,7 @@ from shipshape.serving.rest.schemas import ContactBody, Problem, QueryFields, Re
 
 REF = "#/components/schemas/{model}"
 REQUESTS: Sequence[type[BaseModel]] = (ContactBody, RecogniseBody, ScanBody, Problem)
+_PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": REF.format(model="Problem")}}}
 _TIMEOUT = {
     "name": TIMEOUT_HEADER,
     "in": "header",
@@ -39,11 +40,15 @@ def scan_extra() -> dict[str, Any]:
 
 def problems(*kinds: FaultKind) -> dict[int | str, dict[str, Any]]:
     """The refusals of a path."""
-    content = {MEDIA_TYPE: {"schema": {"$ref": REF.format(model="Problem")}}}
     return {
-        STATUS[kind]: {"description": kind.replace("_", " ").capitalize() + ".", "content": content}
+        STATUS[kind]: {"description": kind.replace("_", " ").capitalize() + ".", "content": _PROBLEM}
         for kind in kinds
     }
+
+
+def unsupported() -> dict[int | str, dict[str, Any]]:
+    """The refusal of a body of another media type, which is the framework's and has no kind of its own."""
+    return {415: {"description": "Unsupported media type.", "content": _PROBLEM}}
 
 
 def add_contract(app: FastAPI) -> None:

@@ -8,7 +8,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
 from shipshape.serving.faults import Fault, FaultKind, fault_of
-from shipshape.telemetry import request_id
+from shipshape.telemetry import new_request_id, request_id
 
 STATUS = {
     FaultKind.INVALID_INPUT: 400,
@@ -22,6 +22,13 @@ STATUS = {
 }
 MEDIA_TYPE = "application/problem+json"
 ID_HEADER = "X-Request-Id"
+
+
+def identify(request: Request) -> str:
+    """The request's id, in its problem document and in the log; the same however often it is asked for."""
+    if not hasattr(request.state, "request_id"):
+        request.state.request_id = new_request_id(request.headers.get(ID_HEADER, ""))
+    return str(request.state.request_id)
 
 
 def problem(fault: Fault) -> Response:
@@ -39,6 +46,7 @@ def add_handlers(app: FastAPI) -> None:
 
 def _framework_refusal(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    identify(request)
     title = HTTPStatus(error.status_code).phrase
     detail = error.detail
     if error.status_code == 404:
@@ -53,12 +61,14 @@ def _framework_refusal(request: Request, error: Exception) -> Response:
 
 def _validation_refusal(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
+    identify(request)
     first = error.errors()[0]
     where = ".".join(map(str, first["loc"]))
     return problem(Fault(FaultKind.INVALID_INPUT, f"expected another value of {where}, got: {first['msg']}"))
 
 
 def _unforeseen(request: Request, error: Exception) -> Response:
+    identify(request)
     return problem(fault_of(error))
 
 
@@ -71,5 +81,4 @@ def _document(status: int, *, title: str, detail: str, error: FaultKind) -> Resp
         "error": error,
         "request_id": request_id.get(),
     }
-    headers = {ID_HEADER: request_id.get()} if request_id.get() else None
-    return Response(orjson.dumps(body), status, headers, media_type=MEDIA_TYPE)
+    return Response(orjson.dumps(body), status, {ID_HEADER: request_id.get()}, media_type=MEDIA_TYPE)

@@ -1,4 +1,4 @@
-"""A request's bytes -> contacts and wishes; the limit on bytes holds while they are read."""
+"""A request's headers and bytes -> contacts and wishes."""
 
 from collections.abc import Mapping
 from typing import Any, TypeVar
@@ -6,13 +6,11 @@ from typing import Any, TypeVar
 from fastapi import HTTPException, Request
 from pydantic import BaseModel, ValidationError
 from pydantic_core import from_json
-from starlette.requests import ClientDisconnect
 
-from shipshape.errors import Cancelled, InvalidInput
+from shipshape.errors import InvalidInput
 from shipshape.serving.encoding import (
     Limits,
     Wishes,
-    check_body,
     check_contacts,
     make_contact,
     points_from_base64,
@@ -34,27 +32,6 @@ JSON = "application/json"
 PACKED = "application/octet-stream"
 TIMEOUT_HEADER = "Shipshape-Timeout-Ms"
 M = TypeVar("M", bound=BaseModel)
-
-
-async def read_body(request: Request, limits: Limits) -> bytes:
-    """The whole body.
-
-    Raises:
-        TooLarge: It is over the limit, as soon as that is known, whether its length was declared or not.
-        Cancelled: The caller left half-way.
-    """
-    declared = request.headers.get("content-length", "")
-    if declared.isdecimal():
-        check_body(int(declared), limits)
-    chunks, size = [], 0
-    try:
-        async for chunk in request.stream():
-            size += len(chunk)
-            check_body(size, limits)
-            chunks.append(chunk)
-    except ClientDisconnect as error:
-        raise Cancelled("the caller left before its request was complete") from error
-    return b"".join(chunks)
 
 
 def media_type(request: Request, *accepted: str) -> str:
@@ -93,11 +70,13 @@ def parse_json(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[C
     return _with_points(fields, limits), _wishes(fields)
 
 
-def parse_scan(
-    body: bytes, query: Mapping[str, str], limits: Limits
-) -> tuple[list[str], list[Contact | InvalidInput], Wishes]:
+def parse_scan(body: bytes, query: Mapping[str, str]) -> ScanBody:
+    """A scan in JSON, its contacts still as they came."""
+    return _validated(ScanBody, _json(body, query))
+
+
+def decode_scan(scan: ScanBody, limits: Limits) -> tuple[list[str], list[Contact | InvalidInput], Wishes]:
     """The contacts of a scan with their ids, an error in the place of each that cannot be decoded."""
-    scan = _validated(ScanBody, _json(body, query))
     check_contacts(len(scan.contacts), limits)
     contacts: list[Contact | InvalidInput] = []
     for raw in scan.contacts:

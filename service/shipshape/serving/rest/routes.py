@@ -9,26 +9,27 @@ from starlette.concurrency import run_in_threadpool
 
 from shipshape.errors import NotReady
 from shipshape.executor import Ticket
-from shipshape.serving.core import Answer, Core, Scan
+from shipshape.serving.core import Answer, Core, Scan, conclude
 from shipshape.serving.encoding import Wishes
-from shipshape.serving.faults import Fault, FaultKind, fault_of
+from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.rest import answers
-from shipshape.serving.rest.problems import ID_HEADER, problem
+from shipshape.serving.rest.bodies import Bodies
+from shipshape.serving.rest.problems import ID_HEADER, identify, problem
 from shipshape.serving.rest.requests import (
     JSON,
     PACKED,
+    decode_scan,
     media_type,
     parse_json,
     parse_packed,
     parse_scan,
-    read_body,
     timeout_s,
 )
 from shipshape.serving.rest.waiting import until_settled
-from shipshape.serving.timing import Timeouts, server_timing, summed
-from shipshape.telemetry import OK, SINGLE, Metrics, new_request_id, request_id
+from shipshape.serving.timing import Timeouts, server_timing
+from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
 
-Handler = Callable[[Request], Awaitable[Response]]
+Handler = Callable[[Request, Outcome], Awaitable[Response]]
 T = TypeVar("T")
 SMALL_BYTES = 64 * 2**10  # of a body: JSON of this size is parsed in under a millisecond
 SMALL_SCAN = 32  # contacts: written in under a millisecond
@@ -41,6 +42,7 @@ class Routes:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
+        self._bodies = Bodies(core.limits)
 
     async def recognise(self, request: Request) -> Response:
         """One contact: JSON, or packed points with everything else in the query."""
@@ -48,7 +50,7 @@ class Routes:
 
     async def scan(self, request: Request) -> Response:
         """Many contacts of one scan, admitted together or not at all; a bad one does not spoil the others."""
-        return await self._guarded(request, "recognise_scan", self._scan)
+        return await self._guarded(request, SCAN, self._scan)
 
     async def model(self, request: Request) -> Response:
         """What this service runs and what it accepts."""
@@ -58,10 +60,11 @@ class Routes:
         """The process answers."""
         return _json(b'{"status":"live"}')
 
-    async def ready(self) -> Response:
+    async def ready(self, request: Request) -> Response:
         """Requests are taken: every stage is warm and nobody asked the service to stop."""
         if self._core.ready:
             return _json(b'{"status":"ready"}')
+        identify(request)
         return problem(fault_of(NotReady("expected a ready service, got one that is starting or stopping")))
 
     async def metrics(self) -> Response:
@@ -71,10 +74,10 @@ class Routes:
 
     async def _guarded(self, request: Request, method: str, handle: Handler) -> Response:
         """What every method passes: request id, metrics, and the table of errors."""
-        new_request_id(request.headers.get(ID_HEADER, ""))
+        given = identify(request)
         with self._metrics.request("rest", method) as outcome:
             try:
-                response = await handle(request)
+                response = await handle(request, outcome)
             except HTTPException:  # its answer is the handlers' matter
                 outcome.kind = FaultKind.INVALID_INPUT
                 raise
@@ -82,49 +85,50 @@ class Routes:
                 fault = fault_of(error)
                 outcome.kind = fault.kind
                 return problem(fault)
-        response.headers[ID_HEADER] = request_id.get()
+        response.headers[ID_HEADER] = given
         return response
 
-    async def _recognise(self, request: Request) -> Response:
-        deadline, body = self._deadline(request), await self._body(request)
+    async def _recognise(self, request: Request, _: Outcome) -> Response:
+        model, seconds = self._core.model(), self._timeout(request)
         parse = parse_packed if media_type(request, JSON, PACKED) == PACKED else parse_json
+        deadline = self._core.deadline_in(seconds)
+        async with self._bodies.read(request, seconds) as body:
 
-        def submit() -> tuple[Ticket[Answer], Wishes]:
-            contact, wishes = parse(body, request.query_params, self._core.limits)
-            return self._core.submit(contact, wishes, deadline), wishes
+            def submit() -> tuple[Ticket[Answer], Wishes]:
+                contact, wishes = parse(body, request.query_params, self._core.limits)
+                return self._core.submit(model, contact, wishes, deadline), wishes
 
-        ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
+            ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         await until_settled([ticket], request)
         return await _run(lambda: _single(ticket, wishes), small=not _bulky(wishes))
 
-    async def _scan(self, request: Request) -> Response:
-        deadline, body = self._deadline(request), await self._body(request)
+    async def _scan(self, request: Request, outcome: Outcome) -> Response:
+        model, seconds = self._core.model(), self._timeout(request)
         media_type(request, JSON)
+        deadline = self._core.deadline_in(seconds)
+        async with self._bodies.read(request, seconds) as body:
 
-        def submit() -> tuple[list[str], Scan, Wishes]:
-            ids, contacts, wishes = parse_scan(body, request.query_params, self._core.limits)
-            return ids, self._core.submit_scan(contacts, wishes, deadline), wishes
+            def submit() -> tuple[list[str], Scan, Wishes]:
+                parsed = parse_scan(body, request.query_params)
+                outcome.contacts = len(parsed.contacts)
+                ids, contacts, wishes = decode_scan(parsed, self._core.limits)
+                return ids, self._core.submit_scan(model, contacts, wishes, deadline), wishes
 
-        ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
+            ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         await until_settled(scan.tickets, request)
         small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
         return await _run(lambda: self._many(ids, scan, wishes), small=small)
 
-    async def _model(self, request: Request) -> Response:
+    async def _model(self, _request: Request, _: Outcome) -> Response:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
         return _json(answers.to_bytes(value))
 
     def _many(self, ids: list[str], scan: Scan, wishes: Wishes) -> Response:
-        outcomes = [fault_of(end) if isinstance(end, Exception) else end for end in scan.outcomes()]
-        self._metrics.count_contacts("rest", (end.kind if isinstance(end, Fault) else OK for end in outcomes))
-        timing = server_timing(summed(end.recognition for end in outcomes if not isinstance(end, Fault)))
-        return _json(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), timing)
+        outcomes, stage_ms = conclude(scan, "rest", self._metrics)
+        return _json(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), server_timing(stage_ms))
 
-    def _deadline(self, request: Request) -> float:
-        return self._core.deadline_in(timeout_s(request, self._timeouts.default_ms))
-
-    async def _body(self, request: Request) -> bytes:
-        return await read_body(request, self._core.limits)
+    def _timeout(self, request: Request) -> float:
+        return timeout_s(request, self._timeouts.default_ms)
 
 
 async def _run(work: Callable[[], T], *, small: bool) -> T:

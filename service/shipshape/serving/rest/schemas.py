@@ -22,11 +22,18 @@ class _Asked(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+# A body says of itself what is a number, a string, true or false; in a query everything is text.
+_BODY = ConfigDict(strict=True)
+
+
 class OptionsFields(_Asked):
     """How to compute, and what to put into the answer."""
 
-    preset: Preset = Field(Preset.BEST, description="Which set of methods computes the answer.")
-    image_method: ImageMethod = Field(ImageMethod.FULL_SIDE, description="Used by preset paper alone.")
+    # strict=False: a strict enumeration takes no strings, which are all that JSON and a query have.
+    preset: Preset = Field(Preset.BEST, strict=False, description="Which set of methods computes the answer.")
+    image_method: ImageMethod = Field(
+        ImageMethod.FULL_SIDE, strict=False, description="Used by preset paper alone."
+    )
     bundle: str = Field("", description="Name or digest of the bundle insisted on; empty: whichever runs.")
     include_restored: bool = Field(False, description="Put the whole vessel's points into the answer.")
     include_images: bool = Field(False, description="Put the images before and after inpainting into it.")
@@ -48,6 +55,8 @@ class ContactFields(_Asked):
 class ContactBody(ContactFields):
     """One vessel to recognise; its points in one of the two forms."""
 
+    model_config = _BODY
+
     points: Points = Field(None, description="[x, y, z] each, metres, level frame.")
     points_base64: str | None = Field(
         None, description="The same as packed little-endian float32 x y z, in base64."
@@ -57,6 +66,8 @@ class ContactBody(ContactFields):
 class RecogniseBody(ContactBody, OptionsFields):
     """One contact, and how to compute it."""
 
+    model_config = _BODY
+
 
 class QueryFields(ContactFields, OptionsFields):
     """What goes beside a body of packed points."""
@@ -64,6 +75,8 @@ class QueryFields(ContactFields, OptionsFields):
 
 class ScanBody(OptionsFields):
     """Many contacts of one scan; the options hold for all of them."""
+
+    model_config = _BODY
 
     contacts: Annotated[
         list[Any],  # each is checked alone, so that a bad one does not spoil the others
@@ -81,14 +94,18 @@ class BoxAnswer(BaseModel):
 
 
 class RestoredAnswer(BaseModel):
-    """The whole vessel: the measured points as they came, and the inferred ones."""
+    """The whole vessel: the measured points as they came (preset paper: one a filled pixel), and the inferred."""
 
     points: list[Triple] = Field(description="Metres, level frame.")
     measured: list[bool] = Field(description="Of each point: true measured, false inferred.")
 
 
 class ImagesAnswer(BaseModel):
-    """PNG files in base64; blue, green, red hold the lower, middle and upper layer; black is empty."""
+    """PNG files in base64; black is empty.
+
+    Blue, green, red hold the layers of depth in ascending order: lower, middle, upper in a top view; starboard,
+    middle, port in a side view.
+    """
 
     before: str = Field(description="The projected image.")
     after: str = Field(description="The same after inpainting.")
@@ -110,7 +127,10 @@ class RecognitionAnswer(BaseModel):
         description="Clockwise from true north, [0, 360); null unless the caller gave its own heading."
     )
     box: BoxAnswer
-    measured_points: int = Field(description="Points of the restored cloud that the sensor measured.")
+    measured_points: int = Field(
+        description="Points of the restored cloud that were measured: those that the sensor saw; preset paper: "
+        "one a filled pixel."
+    )
     inferred_points: int = Field(description="Points of the restored cloud that were inferred.")
     keypoints: list[Triple] = Field(description="The points described for classification; metres, level.")
     rung: str = Field(description="Rung of the ladder of ever cheaper answers; full is the top.")
@@ -178,7 +198,7 @@ class ModelAnswer(BaseModel):
 class Problem(BaseModel):
     """RFC 9457 problem document."""
 
-    type: str = Field(description="urn:shipshape:problem:<error>, or about:blank.")
+    type: str = Field(description="urn:shipshape:problem:<error>.")
     title: str
     status: int
     detail: str = Field(description="One sentence: what was expected and what came.")

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import uvicorn
 from fastapi import FastAPI
 
+# httptools takes headers without end; h11 costs about 0.1 ms a request more, 1.1 to 1.2 ms with a fake pipeline.
+PARSER, HEADER_BYTES = "h11", 64 * 2**10
 KEEP_ALIVE_S = 75  # longer than proxies keep idle connections, else they meet a closed one now and then
 
 
@@ -37,6 +39,8 @@ class RestDoor:
             self._app,
             log_config=None,
             access_log=False,
+            http=PARSER,
+            h11_max_incomplete_event_size=HEADER_BYTES,
             timeout_keep_alive=KEEP_ALIVE_S,
             ws="none",
             lifespan="off",

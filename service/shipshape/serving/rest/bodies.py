@@ -1,0 +1,69 @@
+"""A request's body, read within its deadline and within what all bodies together may hold."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import Request
+from starlette.requests import ClientDisconnect
+
+from shipshape.errors import Cancelled, DeadlineExceeded, Overloaded
+from shipshape.serving.encoding import Limits, check_body
+
+LARGEST_AT_ONCE = 8  # bodies of the largest size that may be held at the same time; thousands of usual ones
+
+
+class Bodies:
+    """All bodies that are being read, or wait to be parsed. Used on the event loop alone.
+
+    Args:
+        limits: Bound one body; all together may be `LARGEST_AT_ONCE` times as large.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._held = 0
+
+    @asynccontextmanager
+    async def read(self, request: Request, seconds: float) -> AsyncIterator[bytes]:
+        """The whole body, which counts until the block ends.
+
+        Args:
+            request: Its body must not have been read yet.
+            seconds: What is left until the deadline.
+
+        Raises:
+            TooLarge: It is over the limit, as soon as that is known, whether its length was declared or not.
+            Overloaded: All bodies together are.
+            DeadlineExceeded: It did not arrive in time.
+            Cancelled: The caller left half-way.
+        """
+        declared = request.headers.get("content-length", "")
+        if declared.isdecimal():
+            check_body(int(declared), self._limits)
+        chunks: list[bytes] = []
+        try:
+            await self._in_time(chunks, request, seconds)
+            yield b"".join(chunks)
+        finally:
+            self._held -= sum(map(len, chunks))
+
+    async def _in_time(self, chunks: list[bytes], request: Request, seconds: float) -> None:
+        try:
+            async with asyncio.timeout(seconds):
+                await self._fill(chunks, request)
+        except TimeoutError as error:
+            raise DeadlineExceeded("expected the whole body before the deadline, got a part of it") from error
+        except ClientDisconnect as error:
+            raise Cancelled("the caller left before its request was complete") from error
+
+    async def _fill(self, chunks: list[bytes], request: Request) -> None:
+        most = LARGEST_AT_ONCE * self._limits.max_body_bytes
+        size = 0
+        async for chunk in request.stream():
+            size += len(chunk)
+            check_body(size, self._limits)
+            if self._held + len(chunk) > most:
+                raise Overloaded(f"expected at most {most} bytes of requests at a time, got more")
+            self._held += len(chunk)
+            chunks.append(chunk)
