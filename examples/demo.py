@@ -54,7 +54,7 @@ def main() -> int:
             show_single(rest)
             print(f"\npictures: {', '.join(str(path) for path in sorted(OUT.glob('*.png')))}")
             if keep:
-                print(f"\nserving until Ctrl-C: REST http://{rest}/docs, gRPC {grpc_address}")
+                print(f"\nserving until Ctrl-C: REST http://{rest}/openapi.json, gRPC {grpc_address}")
                 wait_for_interrupt(process)
     except DemoFailed as error:
         print(f"demo: {error}", file=sys.stderr)
