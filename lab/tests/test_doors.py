@@ -1,5 +1,9 @@
-"""Clusters ray-cast from real hulls, through both doors of a real service with the shipped bundle."""
+"""Real requests through both doors of a real service with the shipped bundle: real hulls, and the README's own."""
 
+import re
+import shutil
+import subprocess
+import sys
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +18,7 @@ from shipshape.bundle import load_bundle
 from shipshape.pipeline import Pipeline
 from shipshape.render import render_png
 from shipshape.serving.core import Model
-from shipshape.serving.service import Service
+from shipshape.serving.service import Addresses, Service
 from shipshape.settings import Settings
 from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
@@ -25,10 +29,9 @@ from shipshape_lab.simulator.sensor import PANDAR64
 
 ROOT = Path(__file__).parents[2]
 MESHES = ROOT.parent / "shared" / "data" / "vessels"
-pytestmark = [
-    pytest.mark.skipif(not MESHES.is_dir(), reason="shared/data/vessels is not beside the repository"),
-    pytest.mark.skipif(not (ROOT / "models/manifest.toml").exists(), reason="the default bundle is not trained"),
-]
+pytestmark = pytest.mark.skipif(
+    not (ROOT / "models/manifest.toml").exists(), reason="the default bundle is not trained"
+)
 PATIENCE = 30.0
 CASES = [
     ("oc_tugboat", "tug", Placement(45.0, heading=0.6, bearing=0.4)),
@@ -38,6 +41,7 @@ CASES = [
 
 @dataclass(frozen=True)
 class Doors:
+    addresses: Addresses
     rest: httpx.Client
     stub: ShipshapeStub
 
@@ -54,9 +58,10 @@ def doors():
         url = f"http://127.0.0.1:{addresses.rest_port}"
         rest = stack.enter_context(httpx.Client(base_url=url, timeout=PATIENCE, trust_env=False))
         channel = stack.enter_context(grpc.insecure_channel(f"127.0.0.1:{addresses.grpc_port}"))
-        yield Doors(rest, ShipshapeStub(channel))
+        yield Doors(addresses, rest, ShipshapeStub(channel))
 
 
+@pytest.mark.skipif(not MESHES.is_dir(), reason="shared/data/vessels is not beside the repository")
 @pytest.mark.parametrize(("mesh", "kind", "placement"), CASES, ids=[mesh for mesh, *_ in CASES])
 def test_a_real_hull_gets_one_answer_through_both_doors(doors, mesh, kind, placement):
     vessel = load_vessel(MESHES / f"{mesh}.ply")
@@ -73,6 +78,35 @@ def test_a_real_hull_gets_one_answer_through_both_doors(doors, mesh, kind, place
         assert by_grpc[number] == pytest.approx(by_rest[number], abs=1e-5)
     assert abs(np.degrees(np.angle(np.exp(1j * (by_rest["heading"] - placement.heading))))) < 10.0
     assert overlap(by_rest, placement, vessel.box) > 0.7
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
+def test_the_requests_of_the_readme_get_their_answers(doors, tmp_path):
+    (tmp_path / "examples").mkdir()
+    shutil.copy(ROOT / "examples/contacts.npz", tmp_path / "examples")
+    blocks = re.findall(r"^```\n(.*?)^```$", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE)
+    requests = [block for block in blocks if "out/contact.f32" in block]
+    told = [run_in(tmp_path, request, doors.addresses) for request in requests]
+    assert len(told) == 2
+    assert '"vessel":"rhib"' in told[0]
+    assert 'vessel: "rhib"' in told[1]
+
+
+def run_in(folder, script, addresses):
+    """What `script` prints when it asks the service at `addresses` instead."""
+    for shown, here in (
+        (".venv/bin/python", sys.executable),
+        ("127.0.0.1:8080", f"127.0.0.1:{addresses.rest_port}"),
+        ("127.0.0.1:50051", f"127.0.0.1:{addresses.grpc_port}"),
+        ("curl ", "curl --noproxy 127.0.0.1 "),
+        ("timeout=1)", f"timeout={PATIENCE})"),
+    ):
+        script = script.replace(shown, here)
+    done = subprocess.run(
+        ["sh", "-ec", script], check=False, cwd=folder, capture_output=True, text=True, timeout=PATIENCE
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def through_grpc(doors, packed, sensor_height):

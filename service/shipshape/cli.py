@@ -87,7 +87,7 @@ def _add(commands: _Commands, name: str, summary: str, notes: str) -> argparse.A
 
 def _add_serve(commands: _Commands) -> None:
     notes = "example:\n  shipshape serve --rest-port 8080 --grpc-port 50051\n\n" + (
-        "Each option, and every limit, is also a variable: SHIPSHAPE_REST_PORT=8080 shipshape serve"
+        "Each option and every limit of a request is also a variable: SHIPSHAPE_REST_PORT=8080 shipshape serve"
     )
     parser = _add(commands, "serve", "open the gRPC and REST doors until SIGTERM", notes)
     parser.set_defaults(command="serve")
