@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from builders_recognition import SIZE, recognised
 from shipshape.render import render_png
 from shipshape.render.canvas import Canvas, Font, Rect
-from shipshape.render.style import INFERRED, MEASURED
-from shipshape.render.text_panels import vessel_title
+from shipshape.render.cluster_panels import draw_cluster_from_above
+from shipshape.render.image_panels import draw_image
+from shipshape.render.style import BACKGROUND, INFERRED, MEASURED
+from shipshape.render.text_panels import draw_stages, vessel_title
 from shipshape.render.views import View, bow_line, box_corners, from_above, from_direction
 from shipshape.types import Box, Contact, ImagePair, Preset, RestoredCloud
 
@@ -31,7 +33,8 @@ def test_the_picture_is_a_png_that_shows_measured_and_inferred(preset, unknown):
     picture = decoded(render_png(*recognised(preset=preset, unknown=unknown)))
     assert picture.shape == (900, 1600, 3)
     assert share_near(picture, MEASURED) > 0.001
-    assert share_near(picture, INFERRED) > 0.001
+    bare = decoded(render_png(*recognised(preset=preset, unknown=unknown, inferred=0)))
+    assert share_near(picture, INFERRED) > 0.0005 + share_near(bare, INFERRED)
 
 
 def test_a_picture_is_the_same_every_time_from_any_thread():
@@ -71,8 +74,53 @@ def test_one_point_can_be_drawn():
 
 
 def test_an_unknown_vessel_is_called_so():
-    assert vessel_title(recognised(unknown=True)[1]) == "unknown, most like pilot boat"
-    assert vessel_title(recognised()[1]) == "pilot boat"
+    assert vessel_title(recognised(unknown=True)[1]) == ("unknown", "most like pilot boat")
+    assert vessel_title(recognised()[1]) == ("pilot boat", "")
+
+
+def test_a_long_contact_id_leaves_the_facts_readable():
+    contact, recognition = recognised()
+    long, longer = (
+        decoded(render_png(replace(contact, contact_id="x" * count), recognition)) for count in (40, 256)
+    )
+    np.testing.assert_array_equal(long, longer)
+
+
+def test_a_long_time_leaves_the_words_beside_it_readable():
+    drawn = []
+    canvas = Canvas(800, 200, (0, 0, 0))
+    canvas.text = lambda text, position, font: drawn.append((text, position[0])) or 8.0 * len(text)
+    draw_stages(canvas, Rect(0.0, 0.0, 700.0, 100.0), replace(recognised()[1], stage_ms={"prior": 123456.7}))
+    (number, left), (_, beside), *_ = drawn
+    assert beside > left + 8.0 * len(number)
+
+
+def test_layers_that_lie_over_each_other_show_the_nearest_in_its_colour():
+    image = np.zeros((1, 3, 3), np.uint8)
+    image[0, 0] = 255  # all three layers
+    image[0, 1, 0] = 255  # the farthest alone
+    canvas = Canvas(30, 10, (0, 0, 0))
+    draw_image(canvas, Rect(0.0, 0.0, 30.0, 10.0), image)
+    shown = decoded(canvas.to_png())
+    assert shown[5, 5].tolist() == [80, 90, 255]
+    assert shown[5, 15].tolist() == [255, 120, 60]
+    assert shown[5, 25].tolist() == list(BACKGROUND)
+
+
+@settings(max_examples=20, deadline=None)
+@given(bearing=st.floats(-math.pi, math.pi))
+def test_the_line_of_sight_ends_before_the_cluster(bearing):
+    middle = np.array([50 * math.cos(bearing), 50 * math.sin(bearing), 0])
+    points = middle + np.random.default_rng(0).uniform(-4, 4, (200, 3))
+    canvas, ends = Canvas(300, 300, (0, 0, 0)), []
+    canvas.arrow = lambda start, end, colour, **form: ends.append((start, end))
+    canvas.dots = lambda places, colours, radius: ends.append(places)
+    draw_cluster_from_above(canvas, Rect(40.0, 40.0, 220.0, 220.0), Contact(points.astype(np.float32)))
+    places, (start, end) = ends
+    apart = np.hypot(*(places - end).T).min()
+    assert apart >= 9.9
+    assert 0 < min(start) < max(start) < 300
+    assert np.dot(np.subtract(end, start), places.mean(axis=0) - start) > 0
 
 
 def test_from_above_ahead_is_up_and_port_is_left():

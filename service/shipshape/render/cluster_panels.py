@@ -9,24 +9,21 @@ from shipshape.render.style import FAINT, GRID, MEASURED, MUTED, PANEL, TEXT, WA
 from shipshape.render.views import View, fade, from_above, from_direction
 from shipshape.types import Contact
 
-_SIGHT_SHARE = 0.42  # length of the line of sight arrow as a share of half the view
+_SIGHT_PIXELS = 34.0  # length of the arrow along the line of sight
+_SIGHT_GAP = 10.0  # pixels that it ends before the nearest point
 
 
 def draw_cluster_from_above(canvas: Canvas, area: Rect, contact: Contact) -> None:
     """The chart of the cluster, with an arrow along the line of sight."""
     points = contact.points_level.astype(np.float64)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    reach = 0.5 * max(float(np.hypot(*np.ptp(points[:, :2], axis=0))), 2.0)
+    reach = 0.6 * max(float(np.hypot(*np.ptp(points[:, :2], axis=0))), 2.0)
     corners = middle + reach * np.array([[1, 1, 0], [-1, -1, 0]])
     view = View(canvas, area, from_above(), corners)
     _draw_crosshair(canvas, area)
     _draw_points(view, points)
     range_m = math.hypot(middle[0], middle[1])
-    outward = middle[:2] / max(range_m, 1e-6)
-    step = np.array([-outward[1], -outward[0]]) * min(area.width, area.height) / 2  # picture y is down
-    start = np.array(area.centre) - step
-    end = start + step * _SIGHT_SHARE
-    canvas.arrow((start[0], start[1]), (end[0], end[1]), TEXT, width=1.5, head=9.0)
+    _draw_sight(view, points, middle[:2] / max(range_m, 1e-6))
     view.scale_bar()
     note = f"line of sight: {range_m:.0f} m, bearing {math.degrees(math.atan2(middle[1], middle[0])):+.0f}°"
     canvas.text(note, (area.right, area.bottom + 16), Font(MUTED, 12.0, anchor="right"))
@@ -43,6 +40,15 @@ def draw_cluster_from_sensor(canvas: Canvas, area: Rect, contact: Contact, water
     _draw_points(view, points)
     view.scale_bar()
     canvas.text("waterline", (area.right, area.bottom + 16), Font(WATER, 12.0, anchor="right"))
+
+
+def _draw_sight(view: View, points: np.ndarray, outward: np.ndarray) -> None:
+    """An arrow from the sensor's side that ends short of the cluster."""
+    middle = view.rect.centre
+    towards_sensor = np.array([outward[1], outward[0]])  # in the picture, where y is down and port is left
+    near = float(((view.place(points) - middle) @ towards_sensor).max()) + _SIGHT_GAP
+    end, start = (np.array(middle) + towards_sensor * (near + length) for length in (0.0, _SIGHT_PIXELS))
+    view.canvas.arrow((start[0], start[1]), (end[0], end[1]), TEXT, width=1.5, head=9.0)
 
 
 def _draw_crosshair(canvas: Canvas, area: Rect) -> None:

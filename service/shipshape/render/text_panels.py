@@ -15,30 +15,31 @@ _MAX_BARS = 6
 _TITLE_WIDTH = 600.0
 
 
-def vessel_title(recognition: Recognition) -> str:
-    """`pilot boat`, or `unknown, most like pilot boat`."""
+def vessel_title(recognition: Recognition) -> tuple[str, str]:
+    """`pilot boat` and nothing more, or `unknown` and `most like pilot boat`."""
     name = _spoken(recognition.vessel)
-    return f"unknown, most like {name}" if recognition.unknown else name
+    return (UNKNOWN, f"most like {name}") if recognition.unknown else (name, "")
 
 
 def draw_title(canvas: Canvas, area: Rect, contact: Contact, recognition: Recognition) -> None:
     """What it is on the left; how it lies and how large it is on the right."""
-    title = vessel_title(recognition)
+    title, note = vessel_title(recognition)
     name = Font(ALARM if recognition.unknown else TEXT, 38.0, 600)
     name = replace(name, size=name.size * min(1.0, _TITLE_WIDTH / canvas.text_width(title, name)))
     width = canvas.text(title, (area.x, area.y + 42), name)
     shown = recognition.probabilities[UNKNOWN] if recognition.unknown else recognition.probability
-    canvas.text(f"{shown:.1%}", (area.x + width + 18, area.y + 42), Font(MEASURED, 30.0, 500))
+    width += 18 + canvas.text(f"{shown:.1%}", (area.x + width + 18, area.y + 42), Font(MEASURED, 30.0, 500))
+    canvas.text(_cut(note, 32), (area.x + width + 18, area.y + 42), Font(MUTED, 20.0))
     canvas.text(_provenance(contact, recognition), (area.x, area.y + 66), Font(MUTED, 13.0))
     x = area.right
-    for label, value, note in reversed(_facts(recognition)):
+    for label, value, remark in reversed(_facts(recognition)):
         column = max(
-            canvas.text_width(value, Font(TEXT, 24.0, 500)), canvas.text_width(note, Font(MUTED, 12.0)), 60
+            canvas.text_width(value, Font(TEXT, 24.0, 500)), canvas.text_width(remark, Font(MUTED, 12.0)), 60
         )
         x -= column
         canvas.text(label, (x, area.y + 12), Font(FAINT, 12.0, 500))
         canvas.text(value, (x, area.y + 42), Font(TEXT, 24.0, 500))
-        canvas.text(note, (x, area.y + 64), Font(MUTED, 12.0))
+        canvas.text(remark, (x, area.y + 64), Font(MUTED, 12.0))
         x -= 34
 
 
@@ -49,7 +50,7 @@ def draw_probabilities(canvas: Canvas, area: Rect, recognition: Recognition) -> 
     for index, (name, probability) in enumerate(ranked[:_MAX_BARS]):
         y = area.y + (index + 0.5) * row
         font = Font(TEXT if index == 0 else MUTED, 13.0, 500 if index == 0 else 400, anchor="right")
-        canvas.text(_spoken(name), (area.x + 150, y + 5), font)
+        canvas.text(_cut(_spoken(name), 20), (area.x + 150, y + 5), font)
         track = Rect(area.x + 164, y - 6, area.width - 164 - 66, 12)
         canvas.rectangle(track, GRID)
         if probability >= 0.001:
@@ -61,8 +62,8 @@ def draw_probabilities(canvas: Canvas, area: Rect, recognition: Recognition) -> 
 def draw_stages(canvas: Canvas, area: Rect, recognition: Recognition) -> None:
     """One bar as long as the whole pipeline, a piece for each stage, and the milliseconds in words."""
     total = sum(recognition.stage_ms.values())
-    canvas.text(f"{total:.1f} ms", (area.x, area.y + 26), Font(TEXT, 26.0, 600))
-    canvas.text("for the whole contact", (area.x + 118, area.y + 26), Font(MUTED, 13.0))
+    width = canvas.text(f"{total:.1f} ms", (area.x, area.y + 26), Font(TEXT, 26.0, 600))
+    canvas.text("for the whole contact", (area.x + width + 12, area.y + 26), Font(MUTED, 13.0))
     x, y = area.x, area.y + 40
     stages = list(zip(recognition.stage_ms.items(), _stage_colours(len(recognition.stage_ms)), strict=True))
     for (_, ms), colour in stages:
@@ -89,10 +90,14 @@ def _spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
 def _provenance(contact: Contact, recognition: Recognition) -> str:
     method = f" / {recognition.image_method.value}" if recognition.image_method else ""
     parts = [
-        f"contact {contact.contact_id}" if contact.contact_id else "",
+        f"contact {_cut(contact.contact_id, 32)}" if contact.contact_id else "",
         f"{len(contact.points_level):,} points",
         f"preset {recognition.preset.value}{method}",
         f"rung {recognition.rung}",
