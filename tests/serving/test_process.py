@@ -1,8 +1,11 @@
-"""The real thing: a process with the shipped bundle, from start to SIGTERM."""
+"""The real thing: a process, with the shipped bundle where there is one, from start to a signal."""
 
+import hashlib
 import json
+import math
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +13,7 @@ from pathlib import Path
 
 import grpc
 import httpx
+import numpy as np
 import pytest
 
 from serving.fakes import PATIENCE, cluster, request, rows
@@ -17,18 +21,16 @@ from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
 
 TESTS = Path(__file__).parents[1]
 MODELS = TESTS.parent / "models"
-SERVE = """
+CONTACTS = TESTS.parent / "examples/contacts.npz"
+SERVE_FAKES = """
 import sys
+from serving.fakes import PNG, FakeBundle, FakePipeline
 from shipshape.serving import life
 from shipshape.settings import load_settings
-{before}
-sys.exit(life.serve(load_settings()))
-"""
-WITH_FAKES = """
-from serving.fakes import PNG, FakeBundle, FakePipeline
 life.load_bundle = lambda path: FakeBundle()
 life.Pipeline = lambda bundle, limits: FakePipeline()
 life.render_png = lambda contact, recognition: PNG
+sys.exit(life.serve(load_settings()))
 """
 START_PATIENCE = 60.0
 needs_models = pytest.mark.skipif(
@@ -36,11 +38,32 @@ needs_models = pytest.mark.skipif(
 )
 
 
-def start(before="", **variables):
+def flip_a_byte(network):
+    content = bytearray(network.read_bytes())
+    content[len(content) // 2] ^= 1
+    network.write_bytes(content)
+
+
+def cut_short(network):
+    network.write_bytes(network.read_bytes()[:-1000])
+
+
+def cut_short_and_signed(network):
+    before = hashlib.sha256(network.read_bytes()).hexdigest()
+    cut_short(network)
+    manifest = network.with_name("manifest.toml")
+    after = hashlib.sha256(network.read_bytes()).hexdigest()
+    manifest.write_text(manifest.read_text().replace(before, after))
+
+
+def take_away(network):
+    network.unlink()
+
+
+def start(*command, **variables):
     environment = {name: value for name, value in os.environ.items() if not name.startswith("SHIPSHAPE_")}
     environment |= {"SHIPSHAPE_REST_PORT": "0", "SHIPSHAPE_GRPC_PORT": "0", "PYTHONPATH": str(TESTS), **variables}
-    script = [sys.executable, "-c", SERVE.format(before=before)]
-    return subprocess.Popen(script, env=environment, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen([sys.executable, *command], env=environment, stderr=subprocess.PIPE, text=True)
 
 
 def until_ready(process):
@@ -52,24 +75,79 @@ def until_ready(process):
     pytest.fail(f"it ended with {process.wait(PATIENCE)} before it was ready")
 
 
-@pytest.mark.parametrize(
-    ("before", "number"),
-    [(WITH_FAKES, signal.SIGTERM), pytest.param("", signal.SIGINT, marks=needs_models)],
-    ids=["fakes", "models"],
-)
-def test_a_process_serves_and_stops_when_told_to(before, number):
-    with start(before, SHIPSHAPE_BUNDLE=str(MODELS)) as process:
+def stopped_by(process, number):
+    process.send_signal(number)
+    assert process.wait(START_PATIENCE) == 0
+    assert json.loads(process.stderr.read().splitlines()[-1])["message"] == "stopped"
+
+
+def test_a_process_serves_and_stops_when_told_to():
+    with start("-c", SERVE_FAKES) as process:
         try:
             rest_port, grpc_port = until_ready(process)
-            points = cluster(400)
             with grpc.insecure_channel(f"127.0.0.1:{grpc_port}") as channel:
-                by_grpc = ShipshapeStub(channel).Recognise(request(points), timeout=PATIENCE).recognition
-            url = f"http://127.0.0.1:{rest_port}/v1/recognise"
-            by_rest = httpx.post(url, json={"points": rows(points)}, timeout=PATIENCE, trust_env=False).json()
-            assert by_grpc.vessel == by_rest["vessel"]
-            assert by_grpc.heading == pytest.approx(by_rest["heading"])
-            process.send_signal(number)
-            assert process.wait(START_PATIENCE) == 0
-            assert json.loads(process.stderr.read().splitlines()[-1])["message"] == "stopped"
+                assert (
+                    ShipshapeStub(channel).Recognise(request(cluster()), timeout=PATIENCE).recognition.vessel
+                    == "tug"
+                )
+            assert httpx.get(f"http://127.0.0.1:{rest_port}/readyz", trust_env=False).status_code == 200
+            stopped_by(process, signal.SIGINT)
         finally:
             process.kill()
+
+
+@needs_models
+def test_the_shipped_bundle_through_both_doors():
+    sample = np.load(CONTACTS, allow_pickle=False)
+    points = sample["points"][: sample["n"][0]].astype("<f4")
+    height = float(sample["sensor_height"])
+    with start("-m", "shipshape", "serve", SHIPSHAPE_BUNDLE=str(MODELS)) as process:
+        try:
+            rest_port, grpc_port = until_ready(process)
+            with grpc.insecure_channel(f"127.0.0.1:{grpc_port}") as channel:
+                asked = request(points, sensor_height_m=height)
+                response, call = ShipshapeStub(channel).Recognise.with_call(asked, timeout=PATIENCE)
+            with httpx.Client(base_url=f"http://127.0.0.1:{rest_port}", timeout=PATIENCE, trust_env=False) as rest:
+                body = {"points": rows(points), "sensor_height_m": height}
+                by_rest, metrics = rest.post("/v1/recognise", json=body), rest.get("/metrics").text
+            found, answer = response.recognition, by_rest.json()
+            assert found.vessel == answer["vessel"] == sample["vessel"][0]
+            assert found.heading == pytest.approx(answer["heading"], abs=1e-6)
+            assert abs(math.remainder(found.heading - sample["heading"][0], math.tau)) < math.radians(10)
+            for timing in (dict(call.trailing_metadata())["server-timing"], by_rest.headers["Server-Timing"]):
+                assert re.findall(r"(\w+);dur=[\d.]+", timing) == list(answer["stage_ms"])
+            for door in ("grpc", "rest"):
+                assert f'shipshape_contacts_total{{door="{door}",outcome="ok"}} 1.0' in metrics
+            assert 'shipshape_stage_seconds_count{stage="classification"} 2.0' in metrics
+            stopped_by(process, signal.SIGTERM)
+        finally:
+            process.kill()
+
+
+@needs_models
+def test_a_signal_during_the_warm_up_ends_the_process():
+    with start("-m", "shipshape", "serve", SHIPSHAPE_BUNDLE=str(MODELS)) as process:
+        try:
+            messages = (json.loads(line)["message"] for line in process.stderr)
+            assert any(message.startswith("live on ") for message in messages)
+            process.send_signal(signal.SIGTERM)
+            assert not [message for message in messages if message.startswith("ready: ")]
+            assert process.wait(START_PATIENCE) == 0
+        finally:
+            process.kill()
+
+
+@needs_models
+@pytest.mark.parametrize("damage", [flip_a_byte, cut_short, cut_short_and_signed, take_away])
+def test_a_damaged_bundle_never_opens_a_port(damage, tmp_path):
+    bundle = tmp_path / "bundle"
+    shutil.copytree(MODELS, bundle)
+    damage(bundle / "prior.onnx")
+    with start("-m", "shipshape", "serve", SHIPSHAPE_BUNDLE=str(bundle)) as process:
+        try:
+            output = process.stderr.read()
+            assert process.wait(START_PATIENCE) == 2
+        finally:
+            process.kill()
+    # The only line: that of a port which is open would say "live".
+    assert re.fullmatch(r"shipshape: expected .*prior.*, got:? .+\n", output)

@@ -42,7 +42,9 @@ class Addresses:
 
 
 class Service:
-    """A service that `start` makes live, `open` makes ready, and `stop` ends without dropping a request.
+    """A service that `start` makes live, `open` makes ready, and `stop` ends without dropping what arrived.
+
+    A REST request counts as arrived with its headers, a gRPC request with its whole message.
 
     Args:
         settings: See there.
