@@ -1,6 +1,7 @@
 """Starts that fail: one sentence on stderr, the exit code that `shipshape --help` lists, nothing left open."""
 
 import os
+import queue
 import re
 import signal
 import socket
@@ -80,8 +81,25 @@ def test_a_signal_during_the_warm_up_ends_it_before_it_is_ready(monkeypatch, cap
         assert life.serve(Settings(rest_port=0, grpc_port=0)) == 0
     finally:
         release.set()
-    (warm_up,) = [thread for thread in threading.enumerate() if thread.name == "warm-up"] or [signaller]
-    warm_up.join(PATIENCE)
+    for thread in [thread for thread in threading.enumerate() if thread.name == "warm-up"]:
+        thread.join(PATIENCE)
     signaller.join()
     assert ready == []
     assert "ready: " not in caplog.text
+
+
+def test_a_signal_an_instant_before_the_wait_is_not_slept_over():
+    waits = []
+
+    class Ends:
+        """As when the signal's flag was set just before: its handler runs only after the wait."""
+
+        def get(self, timeout=None):
+            waits.append(timeout)
+            if len(waits) == 1:
+                assert timeout is not None, "this wait would never end"
+                raise queue.Empty
+            return signal.SIGTERM
+
+    assert life._first(Ends()) == signal.SIGTERM
+    assert len(waits) == 2

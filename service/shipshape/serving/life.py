@@ -5,6 +5,7 @@ import queue
 import signal
 import sys
 import threading
+from contextlib import suppress
 
 from shipshape.bundle import load_bundle
 from shipshape.errors import BundleError, Cancelled
@@ -18,6 +19,7 @@ from shipshape.validation import ContactLimits
 
 _logger = logging.getLogger(__name__)
 OK, FAILED, UNUSABLE = 0, 1, 2  # exit codes, as `cli` lists them
+LOOK_S = 0.5  # between two looks for a signal that came an instant too early to end the wait
 LEAVE_S = 2.0  # for a warm-up to reach the end of its stage; networks take milliseconds, compiling may take longer
 
 # What ends the wait of the main thread: a signal's number, a door that died (None), or a warm-up that failed.
@@ -56,10 +58,17 @@ def _run(service: Service, model: Model, addresses: Addresses, ends: "queue.Simp
     opening = threading.Thread(target=_open, args=(service, model, addresses, ends), name="warm-up", daemon=True)
     opening.start()
     try:
-        return ends.get()
+        return _first(ends)
     finally:
         service.stop()
         opening.join(LEAVE_S)
+
+
+def _first(ends: "queue.SimpleQueue[End]") -> End:
+    # Without the timeout, a signal in the instant before the wait would set its flag and wake nobody.
+    while True:
+        with suppress(queue.Empty):
+            return ends.get(timeout=LOOK_S)
 
 
 def _open(service: Service, model: Model, addresses: Addresses, ends: "queue.SimpleQueue[End]") -> None:
