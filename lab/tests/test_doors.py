@@ -20,6 +20,7 @@ from shipshape.render import render_png
 from shipshape.serving.core import Model
 from shipshape.serving.service import Addresses, Service
 from shipshape.settings import Settings
+from shipshape.types import Contact
 from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
 from shipshape_lab.simulator.mesh_files import load_vessel
@@ -78,6 +79,23 @@ def test_a_real_hull_gets_one_answer_through_both_doors(doors, mesh, kind, place
         assert by_grpc[number] == pytest.approx(by_rest[number], abs=1e-5)
     assert abs(np.degrees(np.angle(np.exp(1j * (by_rest["heading"] - placement.heading))))) < 10.0
     assert overlap(by_rest, placement, vessel.box) > 0.7
+
+
+@pytest.mark.skipif(not MESHES.is_dir(), reason="shared/data/vessels is not beside the repository")
+@pytest.mark.parametrize("mesh", ["bc_hmas_armidale", "bc_hmas_brunei", "bc_hmas_huon"])
+@pytest.mark.parametrize("heading", [1.2, -2.0])
+def test_a_real_ship_longer_than_the_catalogue_is_unknown(mesh, heading):
+    placement = Placement(80.0, heading=heading, bearing=0.1)
+    seen = scan_vessel(
+        load_vessel(MESHES / f"{mesh}.ply"),
+        PANDAR64,
+        placement=placement,
+        conditions=Conditions(),
+        rng=np.random.default_rng(0),
+    )
+    said = Pipeline(load_bundle(ROOT / "models")).run(Contact(seen.points_level))
+    assert said.unknown
+    assert said.probabilities["unknown"] > 0.9
 
 
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")

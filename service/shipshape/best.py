@@ -1,5 +1,7 @@
 """Preset `best`: what measured best; class-free pose, occupancy and height apart, all evidence fused."""
 
+import numpy as np
+
 from shipshape import raster
 from shipshape.bundle import Bundle
 from shipshape.softmax import softmax
@@ -13,6 +15,7 @@ class BestMethod:
     def __init__(self, bundle: Bundle) -> None:
         self._models = bundle.models
         self._parameters = bundle.parameters["best"]
+        self._longest = max(vessel.box.length for vessel in bundle.catalogue)
 
     def heading(self, work: Work) -> None:
         """One look along the line of sight, then looks in the aligned frame."""
@@ -52,4 +55,6 @@ class BestMethod:
         """Prior, aligned look, bottleneck and restored cloud, weighted as validation says."""
         restored = classification.mean_confidence(work.images, self._models["spd2"])
         evidence = [work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]
-        work.probabilities = classification.fuse(evidence, self._parameters["fusion_weights"])
+        fused = classification.fuse(evidence, self._parameters["fusion_weights"])
+        measured_along = work.points_vessel[work.restored.measured, 0]
+        work.probabilities = classification.rule_out_too_long(fused, float(np.ptp(measured_along)), self._longest)

@@ -12,7 +12,7 @@ from scipy import special
 from builders import constant, properties
 from shipshape.softmax import softmax
 from shipshape.stages import prior
-from shipshape.stages.classification import fuse, mean_confidence
+from shipshape.stages.classification import fuse, mean_confidence, rule_out_too_long
 
 LOGITS = arrays(np.float32, st.tuples(st.integers(1, 4), st.just(5)), elements=st.floats(-80, 80, width=32))
 SEEDS = st.integers(0, 2**32 - 1)
@@ -106,3 +106,12 @@ def test_a_witness_that_rules_a_class_out_does_not_break_the_pool() -> None:
 def test_each_witness_needs_its_weight() -> None:
     with pytest.raises(ValueError, match=r"."):
         fuse(certainties(1), [1.0, 1.0])
+
+
+def test_what_measures_longer_than_every_vessel_is_unknown() -> None:
+    probabilities = np.array([0.7, 0.2, 0.1], np.float32)
+    np.testing.assert_array_equal(rule_out_too_long(probabilities, 34.0, longest=27.5), probabilities)
+    doubted = rule_out_too_long(probabilities, 35.0, longest=27.5)
+    assert doubted.sum() == pytest.approx(1.0)
+    assert doubted[-1] > 0.99
+    assert doubted[0] > doubted[1] > 0  # which it is most like is still told
