@@ -49,6 +49,12 @@ def test_a_run_that_was_stopped_ends_as_one_that_was_not(tmp_path, monkeypatch):
         torch.testing.assert_close(found, wanted)
 
 
+def test_a_checkpoint_of_another_schedule_is_refused(tmp_path):
+    loop.train(fresh_net(), data(), loss_of, loop.Schedule(epochs=1, batch=32), tmp_path / "net.pt")
+    with pytest.raises(ValueError, match="expected a checkpoint of 8 steps in all, got one of 4"):
+        loop.train(fresh_net(), data(), loss_of, loop.Schedule(epochs=2, batch=32), tmp_path / "net.pt")
+
+
 def test_training_lowers_the_loss(tmp_path):
     net = loop.train(fresh_net(), data(), loss_of, loop.Schedule(20, batch=32, rate=0.02), tmp_path / "net.pt")
     unseen = data(seed=9)

@@ -64,10 +64,20 @@ class _Run:
         return float(loss.detach())
 
     def resume(self, checkpoint: Path) -> int:
-        """Take up the checkpoint, if there is one; returns the epochs done."""
+        """Take up the checkpoint, if there is one; returns the epochs done.
+
+        Raises:
+            ValueError: it is of another schedule, whose rates cannot be carried on.
+        """
         if not checkpoint.exists():
             return 0
         state = torch.load(checkpoint, weights_only=True, map_location=self.device)
+        steps, kept = self.rates.total_steps, state["rates"]["total_steps"]
+        if steps != kept:
+            raise ValueError(
+                f"expected a checkpoint of {steps} steps in all, got one of {kept}: "
+                f"give the same --epochs and --data, or delete {checkpoint} to start again"
+            )
         for name in ("net", "optimizer", "rates"):
             getattr(self, name).load_state_dict(state[name])
         return int(state["epoch"])

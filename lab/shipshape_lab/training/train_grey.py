@@ -3,7 +3,6 @@
 python -m shipshape_lab.training.train_grey --method full_side --data runs/data --out runs/default
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -42,18 +41,14 @@ def loss_of(net: nn.Module, batch: dict[str, Tensor]) -> Tensor:
 
 def main(argv: list[str] | None = None) -> None:
     """Train, or go on training, and export inpainting_METHOD.onnx."""
-    parser = argparse.ArgumentParser(add_help=False)
-    parser.add_argument("--method", type=ImageMethod, choices=list(ImageMethod), required=True)
-    chosen, rest = parser.parse_known_args(argv)
-    args = arguments.parse(__doc__, rest, epochs=EPOCHS)
+    args = arguments.parse(__doc__, argv, epochs=EPOCHS, method=list(ImageMethod))
+    method = ImageMethod(args.method)
     examples = Examples.read(args.data, "train", catalogue_only=True)
     boxes = examples.boxes
-    data = loop.Drawn(
-        examples.indices, lambda i, rng: to_item(examples.drawn(i, rng), chosen.method, boxes), args.seed
-    )
+    data = loop.Drawn(examples.indices, lambda i, rng: to_item(examples.drawn(i, rng), method, boxes), args.seed)
     torch.manual_seed(args.seed)
     schedule = loop.Schedule(args.epochs, seed=args.seed)
-    name = f"inpainting_{chosen.method}"
+    name = f"inpainting_{method}"
     net = loop.train(GreyNet(), data, loss_of, schedule, args.out / f"checkpoints/{name}.pt")
     write(net, args.out / "bundle", name)
 

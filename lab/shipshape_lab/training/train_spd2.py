@@ -7,7 +7,6 @@ cluster), spd2 (clouds restored by preset `best`), spd2_METHOD (clouds restored 
 The restored ones need the networks of the stages before them.
 """
 
-import argparse
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -107,13 +106,10 @@ def source(model: str, folder: Path, catalogue: Sequence[CatalogueVessel]) -> tu
 
 def main(argv: list[str] | None = None) -> None:
     """Train, or go on training, and export MODEL.onnx."""
-    parser = argparse.ArgumentParser(add_help=False)
     models = ["prior", "parts", "spd2", *(f"spd2_{method}" for method in ImageMethod)]
-    parser.add_argument("--model", choices=models, required=True)
-    chosen, rest = parser.parse_known_args(argv)
-    args = arguments.parse(__doc__, rest, epochs=EPOCHS)
-    examples = Examples.read(args.data, "train", catalogue_only=chosen.model not in KNOW_UNKNOWN)
-    describe, classes = source(chosen.model, args.out / "bundle", examples.catalogue)
+    args = arguments.parse(__doc__, argv, epochs=EPOCHS, model=models)
+    examples = Examples.read(args.data, "train", catalogue_only=args.model not in KNOW_UNKNOWN)
+    describe, classes = source(args.model, args.out / "bundle", examples.catalogue)
     images, labels = collect(examples, describe, args.seed)
     data = loop.Drawn(
         np.arange(len(labels)),
@@ -122,8 +118,8 @@ def main(argv: list[str] | None = None) -> None:
     )
     torch.manual_seed(args.seed)
     schedule = loop.Schedule(args.epochs, batch=256, seed=args.seed)
-    net = loop.train(Spd2Net(classes), data, loss_of, schedule, args.out / f"checkpoints/{chosen.model}.pt")
-    write(net, args.out / "bundle", chosen.model)
+    net = loop.train(Spd2Net(classes), data, loss_of, schedule, args.out / f"checkpoints/{args.model}.pt")
+    write(net, args.out / "bundle", args.model)
 
 
 def write(net: nn.Module, folder: Path, name: str) -> None:
