@@ -76,7 +76,7 @@ def test_json_is_one_object_a_cluster_and_line(scan, cluster, tmp_path, pipeline
         (np.full((50, 3), np.nan), "got 50 points with NaN or infinity"),
         (np.full((50, 3), 1e300), "got 50 points with NaN or infinity"),
         (np.ones((50, 2)), "floats of shape (N, 3), got float64 of shape (50, 2)"),
-        (np.ones((1_000_000, 3), np.float32), "at most 16384 points in a cluster, got 1000000"),
+        (np.ones((1_000_000, 3), np.float32), "at most 65536 points in a cluster, got 1000000"),
         (np.linspace((100, 0, 0), (5100, 0, 0), 50), "got 5000.0 m"),
     ],
     ids=["empty", "nan", "beyond float32", "two columns", "a million", "five kilometres"],

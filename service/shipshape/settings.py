@@ -74,7 +74,7 @@ class Settings(BaseSettings):
         description="Bytes of one request. Larger admits bigger scans, each held in memory while it is read.",
     )
     max_points: int = Field(
-        16384,
+        65536,
         ge=1000,  # the built-in contact of the warm-up
         description="Points of one contact, at least 1000. Bounds the time one contact can take from all the "
         "others.",

@@ -19,7 +19,7 @@ class ContactLimits:
     """What a cluster may be."""
 
     min_points: int = 10  # fewer carry no shape
-    max_points: int = 16_384  # bounds the work of one contact
+    max_points: int = 65_536  # bounds the work of one contact
     max_extent: float = 150.0  # m, between any two points; wider is a scene, not a vessel that was trained on
     min_extent: float = 0.5  # m, horizontally; smaller is spray or a buoy
     max_range: float = 1_000.0  # m; beyond every marine LiDAR

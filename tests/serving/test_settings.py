@@ -20,7 +20,7 @@ def test_defaults_are_safe_and_work():
     effective = load_settings()
     assert effective.host == "127.0.0.1"
     assert (effective.rest_port, effective.grpc_port) == (8080, 50051)
-    assert (effective.max_points, effective.max_contacts, effective.max_body_bytes) == (16384, 256, 16 * 2**20)
+    assert (effective.max_points, effective.max_contacts, effective.max_body_bytes) == (65536, 256, 16 * 2**20)
 
 
 def test_environment_below_overrides(monkeypatch):

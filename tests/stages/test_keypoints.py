@@ -60,3 +60,12 @@ def test_a_small_cloud_gives_fewer() -> None:
 
     assert select_keypoints(together, KeypointParams()).shape == (1, 3)
     assert select_keypoints(together[:0], KeypointParams()).shape == (0, 3)
+
+
+def test_the_densest_place_of_a_crowded_cloud_is_still_found() -> None:
+    rng = np.random.default_rng(1)
+    sparse = rng.uniform(-10, 10, (30_000, 3))
+    crowd = rng.normal([4.0, -3.0, 1.0], 0.1, (30_000, 3))
+    points = rng.permutation(np.concatenate([sparse, crowd])).astype(np.float32)
+    densest = select_keypoints(points, KeypointParams(limit=1))[0]
+    assert np.linalg.norm(densest - [4.0, -3.0, 1.0]) < 0.3

@@ -27,7 +27,7 @@ class Limits:
     """What one request may bring."""
 
     max_body_bytes: int = 16 * 2**20
-    max_points: int = 16384  # of one contact
+    max_points: int = 65536  # of one contact
     max_contacts: int = 256  # of one scan
 
 
