@@ -10,6 +10,7 @@ COMMANDS = {
     "bundle": ("shipshape_lab.training.build_bundle", "calibrate trained networks and write their bundle"),
     "evaluate": ("shipshape_lab.experiments.evaluate_p", "recognition on the paper grid P"),
     "restoration": ("shipshape_lab.experiments.restoration_p", "restoration on the paper grid P"),
+    "real": ("shipshape_lab.experiments.real_hulls", "what a bundle says of real hulls from mesh files"),
     "report": ("shipshape_lab.experiments.report", "tables and figures from the results"),
 }
 
