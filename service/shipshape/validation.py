@@ -37,7 +37,10 @@ def check_contact(contact: Contact, limits: ContactLimits) -> None:
     if points.ndim != 2 or points.shape[1] != 3:
         raise InvalidInput(f"expected points of shape (n, 3), got {points.shape}")
     if len(points) > limits.max_points:
-        raise TooLarge(f"expected at most {limits.max_points} points in a cluster, got {len(points)}")
+        raise TooLarge(
+            f"expected at most {limits.max_points} points in a cluster, got {len(points)}: "
+            "split a scan into clusters first"
+        )
     if len(points) < limits.min_points:
         raise Unprocessable(f"expected at least {limits.min_points} points in a cluster, got {len(points)}")
     broken = int(np.count_nonzero(~np.isfinite(points).all(axis=1)))
@@ -78,7 +81,8 @@ def _check_extent(points: Float32[np.ndarray, "n 3"], limits: ContactLimits) -> 
     nearest = -cv2.pointPolygonTest(hull, (0.0, 0.0), measureDist=True)
     if nearest < _TOUCHING:
         raise Unprocessable(
-            "expected a cluster in the level frame (origin at the LiDAR), got points on all sides of the origin"
+            "expected a cluster in the level frame (origin at the LiDAR), got points on all sides of the origin: "
+            "split a scan into clusters first, and do not centre them"
         )
     if nearest > limits.max_range:
         raise Unprocessable(f"expected a cluster within {limits.max_range:g} m, got one at {nearest:.0f} m")
