@@ -94,8 +94,8 @@ def test_sisters_differ_about_as_much_as_stated(name):
 def test_bare_hull_is_the_same_on_both_sides(name):
     vertices = MONOHULLS[name].hull.shape().vertices
     mirrored = vertices * np.array([1.0, -1.0, 1.0])
-    key = lambda points: {tuple(row) for row in np.round(points, 6) + 0.0}  # noqa: E731
-    assert key(vertices) == key(mirrored)
+    starboard, port = ({tuple(row) for row in np.round(side, 6) + 0.0} for side in (vertices, mirrored))
+    assert starboard == port
 
 
 @pytest.mark.parametrize("name", POINTED)

@@ -17,6 +17,7 @@ from shipshape.bundle import Bundle, load_bundle
 from shipshape.errors import InvalidInput
 from shipshape.pipeline import Pipeline
 from shipshape.types import Contact
+from shipshape_lab.commit import code_commit
 from shipshape_lab.experiments import predictions
 from shipshape_lab.experiments.predictions import Answers, Truth
 from shipshape_lab.experiments.systems import PIPELINES, RAW, SYSTEMS, Run, run_systems
@@ -112,6 +113,7 @@ def write_about(path: Path, bundle: Bundle, **more: object) -> None:
         "bundle_digest": bundle.digest,
         "catalogue": [vessel.name for vessel in bundle.catalogue],
         "training": dict(bundle.training),
+        "code": code_commit(),
         **more,
     }
     path.write_text(json.dumps(about, indent=2, sort_keys=True, default=str) + "\n")

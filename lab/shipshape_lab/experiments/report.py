@@ -71,6 +71,7 @@ def texts(about: dict) -> dict:
         "bundle": about["bundle"],
         "digest": about["bundle_digest"][:16],
         "commit": str(about["training"].get("commit", "unknown")),
+        "code": str(about.get("code", "unknown")),
         "seed": about["training"].get("seed", "unknown"),
         "machine": machine_text(timing),
         "height": about["sensor_height"],
@@ -98,6 +99,7 @@ def write(results: Path, out: Path) -> None:
     provenance = {
         "seed": words["seed"],
         "commit": words["commit"],
+        "code": words["code"],
         "machine": words["machine"],
         "bundle_digest": about["bundle_digest"],
         "restoration.every": words["restoration_every"],

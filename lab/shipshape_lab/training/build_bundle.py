@@ -5,11 +5,11 @@ python -m shipshape_lab.training.build_bundle --data runs/data --out runs/defaul
 
 import argparse
 import shutil
-import subprocess
 from pathlib import Path
 
 from shipshape.bundle import Bundle
 from shipshape.bundle_writer import write_manifest
+from shipshape_lab.commit import code_commit
 from shipshape_lab.simulator.catalogue import same_vessels
 from shipshape_lab.simulator.clusters import load_catalogue
 from shipshape_lab.training.calibrate import calibrated
@@ -39,17 +39,12 @@ def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
     return write_manifest(
         to,
         name="default",
-        training={"commit": _commit(), "seed": seed, "validation_clusters": len(validation)},
+        training={"commit": code_commit(), "seed": seed, "validation_clusters": len(validation)},
         catalogue=validation.catalogue,
         models={file.stem: Path(file.name) for file in files},
         parameters=parameters,
         scores=scores,
     )
-
-
-def _commit() -> str:
-    found = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, check=False)
-    return found.stdout.strip() or "unknown"
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -19,6 +19,7 @@ class BoundedReflection(reflection.ReflectionServicer):
         self._places = threading.BoundedSemaphore(PLACES)
         self._longest_s = longest_s
 
+    # The stubs type the parent's arguments as generated messages, which this pass-through need not know.
     def ServerReflectionInfo(self, request_iterator: Any, context: Any) -> Iterator[Any]:  # type: ignore[override]
         """The stream of questions and answers; RESOURCE_EXHAUSTED when no place is left."""
         if not self._places.acquire(blocking=False):
