@@ -11,6 +11,7 @@ import httpx
 import numpy as np
 import pytest
 
+from shipshape.bundle import Bundle, CatalogueVessel
 from shipshape.serving.core import Model
 from shipshape.serving.service import Service
 from shipshape.settings import Settings
@@ -37,21 +38,18 @@ HEAD = "POST /v1/recognise HTTP/1.1\r\nHost: x\r\nContent-Type: application/octe
 HALF = HEAD.format(4800).encode() + b"\r\nabc"
 
 
-@dataclass(frozen=True)
-class FakeVessel:
-    name: str
-    box: ReferenceBox
-
-
-@dataclass(frozen=True)
-class FakeBundle:
-    name: str = "fake"
-    digest: str = DIGEST
-    catalogue: tuple = (
-        FakeVessel("tug", ReferenceBox(20.0, 8.0, 10.0)),
-        FakeVessel("rhib", ReferenceBox(9.0, 2.5, 3.0)),
-    )
-    scores: dict = field(default_factory=lambda: {"p": {"accuracy": 0.99}, "note": "made up"})
+FAKE_BUNDLE = Bundle(
+    name="fake",
+    digest=DIGEST,
+    catalogue=(
+        CatalogueVessel("tug", ReferenceBox(20.0, 8.0, 10.0)),
+        CatalogueVessel("rhib", ReferenceBox(9.0, 2.5, 3.0)),
+    ),
+    models={},
+    parameters={},
+    scores={"p": {"accuracy": 0.99}, "note": "made up"},
+    training={},
+)
 
 
 @dataclass(frozen=True)
@@ -175,7 +173,7 @@ def running(*, opened=True, **settings):
     )
     addresses = service.start()
     if opened:
-        service.open(Model(FakeBundle(), pipeline))
+        service.open(Model(FAKE_BUNDLE, pipeline))
     channel = grpc.insecure_channel(f"127.0.0.1:{addresses.grpc_port}")
     rest = httpx.Client(base_url=f"http://127.0.0.1:{addresses.rest_port}", timeout=PATIENCE, trust_env=False)
     with channel, rest:

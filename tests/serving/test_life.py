@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from serving.fakes import PATIENCE, PNG, FakeBundle, FakePipeline
+from serving.fakes import FAKE_BUNDLE, PATIENCE, PNG, FakePipeline
 from shipshape.errors import BundleError
 from shipshape.serving import life
 from shipshape.serving.core import Core
@@ -27,7 +27,7 @@ def _leave_the_test_process_as_it_was(monkeypatch):
 
 @pytest.fixture
 def _fakes(monkeypatch):
-    monkeypatch.setattr(life, "load_bundle", lambda path: FakeBundle())
+    monkeypatch.setattr(life, "load_bundle", lambda path: FAKE_BUNDLE)
     monkeypatch.setattr(life, "Pipeline", lambda bundle, limits: FakePipeline())
     monkeypatch.setattr(life, "render_png", lambda contact, recognition: PNG)
 

@@ -24,10 +24,10 @@ MODELS = TESTS.parent / "models"
 CONTACTS = TESTS.parent / "examples/contacts.npz"
 SERVE_FAKES = """
 import sys
-from serving.fakes import PNG, FakeBundle, FakePipeline
+from serving.fakes import FAKE_BUNDLE, PNG, FakePipeline
 from shipshape.serving import life
 from shipshape.settings import load_settings
-life.load_bundle = lambda path: FakeBundle()
+life.load_bundle = lambda path: FAKE_BUNDLE
 life.Pipeline = lambda bundle, limits: FakePipeline()
 life.render_png = lambda contact, recognition: PNG
 sys.exit(life.serve(load_settings()))

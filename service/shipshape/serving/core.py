@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from shipshape.bundle import Bundle
 from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
 from shipshape.executor import Executor, Stage, Task, Ticket
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
 from shipshape.serving.timing import summed
 from shipshape.telemetry import OK, Metrics
-from shipshape.types import Contact, Options, Recognition, ReferenceBox
+from shipshape.types import Contact, Options, Recognition
 
 Render = Callable[[Contact, Recognition], bytes]  # -> PNG
 
@@ -36,51 +37,11 @@ class PipelineLike(Protocol):
         ...
 
 
-@runtime_checkable  # so that shape-checked tests can check it
-class CatalogueEntry(Protocol):
-    """One vessel that the bundle knows."""
-
-    @property
-    def name(self) -> str:
-        """As it appears in answers."""
-        ...
-
-    @property
-    def box(self) -> ReferenceBox:
-        """Outer size, metres."""
-        ...
-
-
-@runtime_checkable  # so that shape-checked tests can check it
-class BundleLike(Protocol):
-    """What the core tells of a bundle."""
-
-    @property
-    def name(self) -> str:
-        """Chosen by whoever made it."""
-        ...
-
-    @property
-    def digest(self) -> str:
-        """sha256, lower-case hex."""
-        ...
-
-    @property
-    def catalogue(self) -> Sequence[CatalogueEntry]:
-        """The vessels it knows."""
-        ...
-
-    @property
-    def scores(self) -> Mapping[str, Any]:
-        """What it reached when it was made; may be nested."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Model:
     """A bundle and the pipeline made of it; replaced as one."""
 
-    bundle: BundleLike
+    bundle: Bundle
     pipeline: PipelineLike
 
 
