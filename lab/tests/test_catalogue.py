@@ -7,7 +7,7 @@ from hulls import box_hull
 from shipshape.types import ImageMethod
 from shipshape_lab.simulator import clusters, datasets
 from shipshape_lab.simulator.catalogue import DEFAULT, read_catalogue, same_vessels
-from shipshape_lab.simulator.vessels import build_vessel
+from shipshape_lab.simulator.vessels import VESSEL_TYPES, build_vessel
 from shipshape_lab.training import train_all
 from shipshape_lab.training.build_bundle import build
 from shipshape_lab.training.examples import Examples
@@ -129,7 +129,7 @@ def test_a_real_mesh_can_be_an_entry(tmp_path):
         ('[[vessel]]\nname = "a"\nmesh = "meshes/barge.stl"\nwaterline = "1"', "finite number as waterline"),
         (FLEET + FLEET.replace('"tug"', '"rhib"'), "name of its own, but has barge, harbour_tug, pontoon twice"),
         (FLEET + '[[vessel]]\nname = "b"\ntype = "tug"', "type of its own, but has tug twice"),
-        ("".join(f'[[vessel]]\nname = "{n}"\ntype = "{n}"\n' for n in DEFAULT.classes), "leave out one"),
+        ("".join(f'[[vessel]]\nname = "{n}"\ntype = "{n}"\n' for n in VESSEL_TYPES), "leave out one"),
     ],
 )
 def test_mistakes_get_one_sentence(folder, text, complaint):

@@ -27,6 +27,7 @@ import trimesh
 from shipshape.bundle import UNKNOWN, CatalogueVessel
 from shipshape.types import ReferenceBox
 from shipshape_lab.simulator.mesh_files import load_vessel
+from shipshape_lab.simulator.strangers import STRANGER_TYPES, build_stranger
 from shipshape_lab.simulator.vessel import Vessel
 from shipshape_lab.simulator.vessels import VESSEL_TYPES, build_vessel
 
@@ -99,8 +100,8 @@ class Catalogue:
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """The catalogue's names, then the types outside of it."""
-        return (*self.names, *self.others)
+        """The catalogue's names, then the types outside of it, then the strangers."""
+        return (*self.names, *self.others, *STRANGER_TYPES)
 
     def build(self, name: str, seed: int | None = None) -> Vessel:
         """One hull of a class, cut at the waterline, in the vessel frame, metres.
@@ -113,7 +114,11 @@ class Catalogue:
             ValueError: the name is not a class, or the vessel's mesh cannot be used.
         """
         entries = {entry.name: entry for entry in self.entries}
-        return entries[name].build(seed) if name in entries else build_vessel(name, seed)
+        if name in entries:
+            return entries[name].build(seed)
+        if name in STRANGER_TYPES and seed is not None:
+            return build_stranger(name, seed)
+        return build_vessel(name, seed)
 
     def boxes(self) -> list[ReferenceBox]:
         """Length, beam and air height of each nominal hull, metres.

@@ -12,7 +12,7 @@ import hashlib
 import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, collect, load
 from shipshape_lab.simulator.scan import Scan, scan_vessel
 from shipshape_lab.simulator.sensor import DEFAULT_LIDAR
 from shipshape_lab.simulator.skirt import with_skirt
+from shipshape_lab.simulator.strangers import STRANGER_TYPES
 from shipshape_lab.simulator.surface import sample_surface
 from shipshape_lab.simulator.vessel import Vessel
 
@@ -31,15 +32,16 @@ __all__ = ["Job", "load", "load_surfaces", "main", "make", "make_surfaces"]
 
 MIN_POINTS = 10
 MAX_DRAWS = 1000
+HULLS_KEPT = 256  # in each process: a real mesh with its search tree takes some 50 MB
 DRAWS_OF_A_BAND = 50
 SURFACE_POINTS = 20_000
-COUNTS = {"train": 20_000, "validation": 4_000, "H": 5_000}  # the grid P has as many as it has cells
+COUNTS = {"train": 40_000, "validation": 5_000, "H": 5_000}  # the grid P has as many as it has cells
 SEEDS = {"train": 1, "validation": 2, "P": 3, "H": 4}
 
 
-@cache
+@lru_cache(maxsize=HULLS_KEPT)
 def hull(name: str, seed: int, catalogue: Catalogue = DEFAULT) -> Vessel:
-    """A hull as the scanner wants it, built once in each process."""
+    """A hull as the scanner wants it, kept for the next cluster of it."""
     return with_skirt(catalogue.build(name, seed))
 
 
@@ -75,8 +77,8 @@ def random_cluster(job: Job, i: int) -> tuple[Scan, str]:
 
 
 def _draw_class(recipe: recipes.Recipe, catalogue: Catalogue, rng: np.random.Generator) -> str:
-    listed = rng.random() < recipe.catalogue_share
-    return str(rng.choice(catalogue.names if listed else catalogue.others))
+    kinds = (catalogue.names, catalogue.others, STRANGER_TYPES)
+    return str(rng.choice(kinds[rng.choice(len(kinds), p=recipe.shares)]))
 
 
 def grid_cluster(job: Job, i: int) -> tuple[Scan, str]:

@@ -1,6 +1,6 @@
 """First hits of rays on a vessel's mesh, through embree.
 
-trimesh keeps the embree scene with the mesh, so scanning a vessel again costs no new scene. Embree
+The embree scene stays with the vessel, so scanning a vessel again costs no new scene. Embree
 works in float32; the distances are taken again from the plane of the triangle that was hit, in float64.
 """
 
@@ -37,7 +37,7 @@ def cast(vessel: Vessel, T_level_vessel: np.ndarray, directions_level: np.ndarra
     ranges, cosines = np.full(len(directions), np.inf), np.zeros(len(directions))
     if len(directions) == 0:
         return Hits(ranges, cosines)
-    triangles = vessel.mesh.ray.intersects_first(np.broadcast_to(origin, directions.shape), directions)
+    triangles = vessel.rays.intersects_first(np.broadcast_to(origin, directions.shape), directions)
     hit = np.flatnonzero(triangles >= 0)
     normals = vessel.mesh.face_normals[triangles[hit]]
     slopes = np.einsum("ij,ij->i", directions[hit], normals)

@@ -11,10 +11,10 @@ import numpy as np
 
 from shipshape_lab.simulator.occluders import BoxOccluder
 from shipshape_lab.simulator.scan import Conditions
-from shipshape_lab.simulator.sea import LIGHT_SEA, MODERATE_SEA, Placement, SeaState
+from shipshape_lab.simulator.sea import MODERATE_SEA, Placement, SeaState
 from shipshape_lab.simulator.sensor import HDL64E, OS1_64, PANDAR64, Lidar
 
-TRAIN_HULLS = range(0, 60)
+TRAIN_HULLS = range(0, 120)
 VALIDATION_HULLS = range(1000, 1012)
 TEST_HULLS = range(2000, 2012)
 
@@ -33,18 +33,18 @@ class Recipe:
     Attributes:
         hulls: seeds of hull variations to pick from.
         bands: (share, nearest, farthest) of the ranges, metres.
-        catalogue_share: share of clusters that show a type of the catalogue.
+        shares: of clusters that show a vessel of the catalogue, a type outside of it, and a stranger.
         sea: the sea in half of the clusters; the other half is calm.
         occluded_share: share of clusters behind an occluder.
         max_dropout: dropout is uniform from 0 to this.
     """
 
     hulls: range
-    bands: tuple[tuple[float, float, float], ...] = ((0.75, 25.0, 125.0), (0.25, 125.0, 200.0))
-    catalogue_share: float = 0.75
-    sea: SeaState = LIGHT_SEA
-    occluded_share: float = 0.1
-    max_dropout: float = 0.15
+    bands: tuple[tuple[float, float, float], ...] = ((0.65, 25.0, 125.0), (0.35, 125.0, 200.0))
+    shares: tuple[float, float, float] = (0.65, 0.23, 0.12)
+    sea: SeaState = MODERATE_SEA
+    occluded_share: float = 0.2
+    max_dropout: float = 0.25
 
 
 RECIPES = {
@@ -53,8 +53,7 @@ RECIPES = {
     "H": Recipe(
         TEST_HULLS,
         bands=((1.0, 30.0, 200.0),),
-        catalogue_share=0.5,
-        sea=MODERATE_SEA,
+        shares=(0.5, 0.5, 0.0),
         occluded_share=0.3,
         max_dropout=0.3,
     ),

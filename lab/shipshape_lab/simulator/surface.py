@@ -36,17 +36,17 @@ def sample_surface(vessel: Vessel, count: int, rng: np.random.Generator) -> np.n
         points, triangles = trimesh.sample.sample_surface(vessel.mesh, draw, seed=rng)
         dry = points[:, 2] >= 0.0
         points, normals = points[dry], vessel.mesh.face_normals[triangles[dry]]
-        kept = np.concatenate([kept, points[_visible(vessel.mesh, points, normals)].astype(np.float32)])
+        kept = np.concatenate([kept, points[_visible(vessel, points, normals)].astype(np.float32)])
         drawn += draw
         if len(kept) >= count:
             return kept[:count]
     raise ValueError(f"hull {vessel.name!r} must show an outer surface above the water, but hardly any was found")
 
 
-def _visible(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _visible(vessel: Vessel, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     # Starting a little off the surface keeps a ray from meeting its own triangle; soups may face either way,
     # so the start goes to the viewer's side.
-    lift = 1e-4 * float(mesh.extents.max())
+    lift = 1e-4 * float(vessel.mesh.extents.max())
     visible = np.zeros(len(points), dtype=bool)
     for view in _views():
         slopes = normals @ view
@@ -54,7 +54,7 @@ def _visible(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> 
         if len(left) == 0:
             continue
         starts = points[left] + lift * np.sign(slopes[left])[:, None] * normals[left]
-        blocked = mesh.ray.intersects_any(starts, np.broadcast_to(view, starts.shape))
+        blocked = vessel.rays.intersects_any(starts, np.broadcast_to(view, starts.shape))
         visible[left[~blocked]] = True
     return visible
 
