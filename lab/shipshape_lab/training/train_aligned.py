@@ -17,7 +17,7 @@ from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import AlignedNet
 from shipshape_lab.training.poses import disturbed
 
-EPOCHS = 14
+EPOCHS = 9
 
 
 def guess(example: Example, rng: np.random.Generator) -> Pose:

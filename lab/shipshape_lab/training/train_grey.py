@@ -17,7 +17,7 @@ from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import GreyNet
 from shipshape_lab.training.poses import paper_pose
 
-EPOCHS = 4
+EPOCHS = 2
 
 
 def to_item(example: Example, method: ImageMethod, boxes: list[ReferenceBox]) -> dict:

@@ -18,7 +18,7 @@ from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import InpaintingNet
 from shipshape_lab.training.poses import disturbed
 
-EPOCHS = 12
+EPOCHS = 7
 WRONG_BOW = 0.01  # share of poses with bow and stern swapped, about what bow_stern leaves
 
 

@@ -16,7 +16,7 @@ from shipshape_lab.training import arguments, export, loop
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import SightNet
 
-EPOCHS = 8
+EPOCHS = 5
 
 
 def to_item(example: Example) -> dict:

@@ -28,7 +28,7 @@ from shipshape_lab.training.nets import Spd2Net
 from shipshape_lab.training.partial import UNCALIBRATED, partial_bundle, run_until
 from shipshape_lab.training.poses import paper_pose
 
-EPOCHS = 4
+EPOCHS = 2
 KNOW_UNKNOWN = ("prior", "spd2")  # the others learn from the vessels of the catalogue alone
 KEYPOINTS = 8  # more than the three of inference: each one is a training sample of its own (section 3.3.2)
 RADIUS = UNCALIBRATED["common"]["spd2_radius"]
