@@ -11,7 +11,11 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
 from tqdm import tqdm
 
+from shipshape_lab.training.fake_quantise import rounded
+
 log = logging.getLogger(__name__)
+
+SETTLING_RATE = 3e-4  # peak; the weights have found their place and only learn to bear the rounding
 
 Batch = dict[str, Tensor]
 
@@ -117,6 +121,28 @@ def train(
         log.info("%s loss %.4f", title, float(np.mean(losses)))
         run.keep(checkpoint, epoch + 1)
     return net.cpu().eval()
+
+
+def train_for_int8(
+    net: nn.Module,
+    draws: Callable[[int], Drawn],
+    loss_of: Callable[[nn.Module, Batch], Tensor],
+    schedule: Schedule,
+    checkpoint: Path,
+) -> nn.Module:
+    """Train `net` as `train` does, then settle it into the rounding of int8 for one epoch more.
+
+    Args:
+        net: freshly made network.
+        draws: seed to training examples; the settling epoch draws others than the first one did.
+        loss_of: as in `train`.
+        schedule: of the epochs before.
+        checkpoint: as in `train`; the settling epoch keeps its own beside it.
+    """
+    net = train(net, draws(schedule.seed), loss_of, schedule, checkpoint)
+    settling = Schedule(1, schedule.batch, SETTLING_RATE, schedule.seed + 1)
+    beside = checkpoint.with_name(f"{checkpoint.stem}_int8.pt")
+    return train(rounded(net), draws(settling.seed), loss_of, settling, beside)
 
 
 def _loader(data: Drawn, schedule: Schedule, epoch: int) -> DataLoader:

@@ -72,10 +72,13 @@ def main(argv: list[str] | None = None) -> None:
         example = examples.drawn(i, rng)
         return to_item(example, guess(example, rng))
 
+    def draws(seed: int) -> loop.Drawn:
+        return loop.Drawn(examples.indices, draw, seed)
+
     torch.manual_seed(args.seed)
     net = AlignedNet(len(examples.catalogue) + 1)
-    data, schedule = loop.Drawn(examples.indices, draw, args.seed), loop.Schedule(args.epochs, seed=args.seed)
-    net = loop.train(net, data, loss_of, schedule, args.out / "checkpoints/aligned.pt")
+    schedule = loop.Schedule(args.epochs, seed=args.seed)
+    net = loop.train_for_int8(net, draws, loss_of, schedule, args.out / "checkpoints/aligned.pt")
     write(net, args.out / "bundle")
 
 

@@ -75,10 +75,13 @@ def main(argv: list[str] | None = None) -> None:
         example = examples.drawn(i, rng)
         return to_item(example, guess(example, rng))
 
+    def draws(seed: int) -> loop.Drawn:
+        return loop.Drawn(examples.indices, draw, seed)
+
     torch.manual_seed(args.seed)
     net = InpaintingNet(len(examples.catalogue) + 1, raster.aligned_frame(1.0).edges)
-    data, schedule = loop.Drawn(examples.indices, draw, args.seed), loop.Schedule(args.epochs, seed=args.seed)
-    net = loop.train(net, data, loss_of, schedule, args.out / "checkpoints/inpainting.pt")
+    schedule = loop.Schedule(args.epochs, seed=args.seed)
+    net = loop.train_for_int8(net, draws, loss_of, schedule, args.out / "checkpoints/inpainting.pt")
     write(net, args.out / "bundle")
 
 

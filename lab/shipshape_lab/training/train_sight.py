@@ -52,10 +52,13 @@ def main(argv: list[str] | None = None) -> None:
     """Train, or go on training, and export sight.onnx."""
     args = arguments.parse(__doc__, argv, epochs=EPOCHS)
     examples = Examples.read(args.data, "train")
-    data = loop.Drawn(examples.indices, lambda i, rng: to_item(examples.drawn(i, rng)), args.seed)
+
+    def draws(seed: int) -> loop.Drawn:
+        return loop.Drawn(examples.indices, lambda i, rng: to_item(examples.drawn(i, rng)), seed)
+
     schedule = loop.Schedule(args.epochs, seed=args.seed)
     torch.manual_seed(args.seed)
-    net = loop.train(SightNet(), data, loss_of, schedule, args.out / "checkpoints/sight.pt")
+    net = loop.train_for_int8(SightNet(), draws, loss_of, schedule, args.out / "checkpoints/sight.pt")
     write(net, args.out / "bundle")
 
 
