@@ -3,8 +3,9 @@ import pytest
 
 from shipshape_lab.simulator import datasets, recipes
 from shipshape_lab.simulator.catalogue import DEFAULT
-from shipshape_lab.simulator.clusters import load, load_surfaces
+from shipshape_lab.simulator.clusters import load, load_surfaces, save
 from shipshape_lab.simulator.datasets import Job, grid_hull, main, make
+from shipshape_lab.simulator.outsiders import OUTSIDER_TYPES
 from shipshape_lab.simulator.recipes import GRID_DISTANCES, GRID_HEADINGS_DEG, RECIPES
 from shipshape_lab.simulator.strangers import STRANGER_TYPES
 from shipshape_lab.simulator.vessels import VESSEL_TYPES
@@ -29,12 +30,78 @@ def test_hull_seeds_of_the_splits_are_disjoint():
     assert len(set.union(*splits)) == sum(map(len, splits))
     assert set(RECIPES["train"].hulls) == splits[0]
     assert set(RECIPES["validation"].hulls) == splits[1]
-    assert set(RECIPES["H"].hulls) == splits[2]
+    for name in ("H", "far", "U"):
+        assert set(RECIPES[name].hulls) == splits[2]
     assert {grid_hull(*cell) for cell in recipes.grid_cells(DEFAULT.names)} == splits[2]
 
 
 def test_seeds_of_the_sets_differ():
-    assert len(set(datasets.SEEDS.values())) == len(datasets.SEEDS) == 4
+    assert len(set(datasets.SEEDS.values())) == len(datasets.SEEDS) == 6
+
+
+def test_no_two_clusters_of_any_sets_share_their_chance():
+    # Occluders, sea, dropout and noise are all drawn from this one stream.
+    first = [Job(name, 0, seed).rng(i).random(4) for name, seed in datasets.SEEDS.items() for i in range(500)]
+    assert len(np.unique(np.round(first, 9).ravel())) == 4 * len(first)
+
+
+def test_no_box_of_the_hard_test_stands_where_one_of_training_did():
+    boxes = {name: occluders_of(name, 60) for name in ("train", "validation", "H")}
+    assert all(len(found) > 5 for found in boxes.values())
+    assert not boxes["H"] & (boxes["train"] | boxes["validation"])
+
+
+def occluders_of(name, count):
+    drawn = []
+    for i in range(count):
+        rng = Job(name, 0, datasets.SEEDS[name]).rng(i)
+        recipe = RECIPES[name]
+        placement = recipes.draw_placement(recipes.draw_band(recipe, rng), rng)
+        drawn += recipes.draw_conditions(recipe, placement, 15.0, rng).occluders
+    return {(box.low, box.high) for box in drawn}
+
+
+def test_only_set_u_shows_outsiders_and_nothing_else():
+    catalogue = datasets.with_outsiders(DEFAULT, None)
+    shown = {name: {drawn_class(name, catalogue, i) for i in range(400)} for name in RECIPES}
+    assert shown.pop("U") == set(OUTSIDER_TYPES)
+    assert not set.union(*shown.values()) & set(OUTSIDER_TYPES)
+    assert shown["far"] == set(DEFAULT.names)
+    assert shown["H"] == set(VESSEL_TYPES)
+
+
+def drawn_class(name, catalogue, i):
+    job = Job(name, 0, datasets.SEEDS[name], catalogue)
+    return datasets._draw_class(RECIPES[name], catalogue, job.rng(i))
+
+
+def test_far_and_u_are_calm_scans_of_the_default_sensor_in_their_ranges():
+    catalogue = datasets.with_outsiders(DEFAULT, None)
+    for name, nearest, farthest in (("far", 110, 180), ("U", 30, 110)):
+        made = make(Job(name, 12, datasets.SEEDS[name], catalogue), progress=False)
+        assert made.range_m.min() > nearest
+        assert made.range_m.max() < farthest
+        assert set(made.lidar) == {"pandar64"}
+        assert set(made.sensor_height) == {3.0}
+        assert made.hidden_share.max() == 0.0
+        assert np.array_equal(made.T_level_vessel[:, 2], np.tile([0.0, 0.0, 1.0, -3.0], (12, 1)))
+
+
+def test_what_occluders_hide_is_recorded(train, tmp_path):
+    assert 0.0 < np.mean(train.hidden_share > 0.0) < 0.4
+    assert np.array_equal(train.occluded, train.hidden_share >= 0.1)
+    save(tmp_path / "new.npz", train)
+    with np.load(tmp_path / "new.npz") as arrays:
+        np.savez(tmp_path / "old.npz", **{name: arrays[name] for name in arrays.files if name != "hidden_share"})
+    assert np.array_equal(load(tmp_path / "new.npz").hidden_share, train.hidden_share)
+    assert np.isnan(load(tmp_path / "old.npz").hidden_share).all()
+    assert not load(tmp_path / "old.npz").occluded.any()
+
+
+def test_a_folder_without_hulls_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["U", "--out", str(tmp_path), "--count", "2", "--meshes", str(tmp_path)])
+    assert "expected .ply files" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", RECIPES)

@@ -27,6 +27,7 @@ import trimesh
 from shipshape.bundle import UNKNOWN, CatalogueVessel
 from shipshape.types import ReferenceBox
 from shipshape_lab.simulator.mesh_files import load_vessel
+from shipshape_lab.simulator.outsiders import Outsider
 from shipshape_lab.simulator.strangers import STRANGER_TYPES, build_stranger
 from shipshape_lab.simulator.vessel import Vessel
 from shipshape_lab.simulator.vessels import VESSEL_TYPES, build_vessel
@@ -83,9 +84,15 @@ Entry = GeneratedVessel | MeshVessel
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Vessels in the order of their class numbers; every type that it neither uses nor names is outside of it."""
+    """Vessels in the order of their class numbers; every type that it neither uses nor names is outside of it.
+
+    Attributes:
+        entries: the vessels to be known.
+        outsiders: things and vessels that only a test shows; they count as unknown, and no training draws them.
+    """
 
     entries: tuple[Entry, ...]
+    outsiders: tuple[Entry | Outsider, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -100,8 +107,8 @@ class Catalogue:
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """The catalogue's names, then the types outside of it, then the strangers."""
-        return (*self.names, *self.others, *STRANGER_TYPES)
+        """The catalogue's names, then the types outside of it, then the strangers, then the outsiders."""
+        return (*self.names, *self.others, *STRANGER_TYPES, *(entry.name for entry in self.outsiders))
 
     def build(self, name: str, seed: int | None = None) -> Vessel:
         """One hull of a class, cut at the waterline, in the vessel frame, metres.
@@ -113,7 +120,7 @@ class Catalogue:
         Raises:
             ValueError: the name is not a class, or the vessel's mesh cannot be used.
         """
-        entries = {entry.name: entry for entry in self.entries}
+        entries = {entry.name: entry for entry in (*self.entries, *self.outsiders)}
         if name in entries:
             return entries[name].build(seed)
         if name in STRANGER_TYPES and seed is not None:

@@ -17,6 +17,7 @@ from shipshape_lab.simulator.catalogue import DEFAULT, Catalogue
 from shipshape_lab.simulator.scan import Scan
 
 NOMINAL_SEED = -1
+OCCLUDED_FROM = 0.1  # share of the returns that something in front took away
 
 Kind = TypeVar("Kind")
 
@@ -49,6 +50,8 @@ class ClusterSet:
         seed: seed of the whole set, a scalar.
         catalogue: names of the K vessels to be known, unicode; the default ones if the file does not say.
         boxes: length, beam and air height of their nominal hulls, shape (K, 3), float64.
+        hidden_share: share of the returns that occluders took away, 0 to 1, NaN if the file does not say, shape
+            (M,), float64.
     """
 
     points: np.ndarray
@@ -66,10 +69,13 @@ class ClusterSet:
     seed: np.ndarray
     catalogue: np.ndarray = field(default_factory=_names)
     boxes: np.ndarray = field(default_factory=_boxes)
+    hidden_share: np.ndarray = field(default_factory=lambda: np.zeros(0))
     starts: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "starts", np.concatenate([[0], np.cumsum(self.n, dtype=np.int64)]))
+        if len(self.hidden_share) != len(self.n):
+            object.__setattr__(self, "hidden_share", np.full(len(self.n), np.nan))
 
     def __len__(self) -> int:
         return len(self.n)
@@ -82,6 +88,11 @@ class ClusterSet:
     def name(self, i: int) -> str:
         """Type name of cluster i."""
         return str(self.classes[self.label[i]])
+
+    @property
+    def occluded(self) -> np.ndarray:
+        """Whether something in front took away at least a tenth of the returns, shape (M,), bool."""
+        return self.hidden_share >= OCCLUDED_FROM
 
     @property
     def vessels(self) -> tuple[CatalogueVessel, ...]:
@@ -122,6 +133,7 @@ def collect(scans: Sequence[tuple[Scan, str]], catalogue: Catalogue, seed: int) 
         seed=np.array(seed, np.int64),
         catalogue=_names(catalogue),
         boxes=_boxes(catalogue),
+        hidden_share=np.array([scan.hidden_share for scan in found], np.float64),
     )
 
 

@@ -1,4 +1,4 @@
-"""Makes the data sets: random sets for training, validation and the hard test, and the paper grid P.
+"""Makes the data sets: random ones for training, validation and the tests H, far and U, and the paper grid P.
 
 Every cluster has its own random stream, the seed sequence of the set with the number of the cluster as its
 spawn key, so a set is the same whatever the number of processes.
@@ -11,7 +11,7 @@ import argparse
 import hashlib
 import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -19,8 +19,9 @@ import numpy as np
 from tqdm import tqdm
 
 from shipshape_lab.simulator import recipes
-from shipshape_lab.simulator.catalogue import DEFAULT, Catalogue, read_catalogue, same_vessels
+from shipshape_lab.simulator.catalogue import DEFAULT, Catalogue, MeshVessel, read_catalogue, same_vessels
 from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, collect, load, load_surfaces, save
+from shipshape_lab.simulator.outsiders import OUTSIDER_TYPES, Outsider
 from shipshape_lab.simulator.scan import Scan, scan_vessel
 from shipshape_lab.simulator.sensor import DEFAULT_LIDAR
 from shipshape_lab.simulator.skirt import with_skirt
@@ -35,8 +36,17 @@ MAX_DRAWS = 1000
 HULLS_KEPT = 256  # in each process: a real mesh with its search tree takes some 50 MB
 DRAWS_OF_A_BAND = 50
 SURFACE_POINTS = 20_000
-COUNTS = {"train": 40_000, "validation": 5_000, "H": 5_000}  # the grid P has as many as it has cells
-SEEDS = {"train": 1, "validation": 2, "P": 3, "H": 4}
+# The grid P has as many as it has cells.
+COUNTS = {"train": 40_000, "validation": 5_000, "H": 5_000, "far": 3_000, "U": 3_000}
+SEEDS = {"train": 1, "validation": 2, "P": 3, "H": 4, "far": 5, "U": 6}
+ABOUT = {
+    "train": "what networks learn from",
+    "validation": "what calibration and every choice go by",
+    "P": "the paper grid: 30 to 110 m, 360 headings, calm",
+    "H": "the hard test: ten types, sea, occluders, dropout, three sensors, 30 to 200 m",
+    "far": "the catalogue at 110 to 180 m, calm",
+    "U": "things and vessels that no model was trained on, scanned as P is",
+}
 
 
 @lru_cache(maxsize=HULLS_KEPT)
@@ -47,12 +57,16 @@ def hull(name: str, seed: int, catalogue: Catalogue = DEFAULT) -> Vessel:
 
 @dataclass(frozen=True)
 class Job:
-    """One set to make: its name, how many clusters, the seed behind all of its chance, and whose clusters."""
+    """One set to make: its name, how many clusters, the seed behind all of its chance, and whose clusters.
+
+    `hulls` takes only the first so many hulls of each class, where the recipe has more.
+    """
 
     name: str
     count: int
     seed: int
     catalogue: Catalogue = DEFAULT
+    hulls: int | None = None
 
     def rng(self, i: int) -> np.random.Generator:
         """The random stream of cluster i alone."""
@@ -67,8 +81,9 @@ def random_cluster(job: Job, i: int) -> tuple[Scan, str]:
         # Else far bands would empty towards near ones; but a small craft may never show enough far off.
         if draw % DRAWS_OF_A_BAND == 0:
             band = recipes.draw_band(recipe, rng)
-        vessel = hull(name, int(rng.choice(recipe.hulls)), job.catalogue)
-        lidar, placement = recipes.draw_lidar(rng), recipes.draw_placement(band, rng)
+        vessel = hull(name, int(rng.choice(recipe.hulls[: job.hulls])), job.catalogue)
+        lidar = recipes.draw_lidar(recipe, rng)
+        placement = recipes.draw_placement(band, rng, recipe.sensor_heights)
         conditions = recipes.draw_conditions(recipe, placement, vessel.box[0], rng)
         scan = scan_vessel(vessel, lidar, placement=placement, conditions=conditions, rng=rng)
         if len(scan.points_level) >= MIN_POINTS:
@@ -77,7 +92,8 @@ def random_cluster(job: Job, i: int) -> tuple[Scan, str]:
 
 
 def _draw_class(recipe: recipes.Recipe, catalogue: Catalogue, rng: np.random.Generator) -> str:
-    kinds = (catalogue.names, catalogue.others, STRANGER_TYPES)
+    outsiders = tuple(entry.name for entry in catalogue.outsiders)
+    kinds = (catalogue.names, catalogue.others, STRANGER_TYPES, outsiders)
     return str(rng.choice(kinds[rng.choice(len(kinds), p=recipe.shares)]))
 
 
@@ -179,8 +195,23 @@ def main(argv: list[str] | None = None) -> None:
 def _job(args: argparse.Namespace) -> Job:
     catalogue = read_catalogue(args.catalogue) if args.catalogue else DEFAULT
     catalogue.boxes()  # reads every mesh, so that one that cannot be used is told before the work starts
+    if args.set == "U":
+        catalogue = with_outsiders(catalogue, args.meshes)
     count = args.count or COUNTS.get(args.set) or len(recipes.grid_cells(catalogue.names))
-    return Job(args.set, count, SEEDS[args.set] if args.seed is None else args.seed, catalogue)
+    return Job(args.set, count, SEEDS[args.set] if args.seed is None else args.seed, catalogue, args.hulls)
+
+
+def with_outsiders(catalogue: Catalogue, meshes: Path | None) -> Catalogue:
+    """The catalogue for set U: all generated outsiders, and the real hulls of a folder if one is given.
+
+    Raises:
+        ValueError: the folder holds no meshes.
+    """
+    paths = sorted(meshes.glob("*.ply")) if meshes else []
+    if meshes and not paths:
+        raise ValueError(f"expected .ply files in {meshes}, got none")
+    real = (MeshVessel(path.stem, path.resolve()) for path in paths)
+    return replace(catalogue, outsiders=(*map(Outsider, OUTSIDER_TYPES), *real))
 
 
 def _made(job: Job, path: Path) -> ClusterSet | None:
@@ -188,22 +219,30 @@ def _made(job: Job, path: Path) -> ClusterSet | None:
         return None
     clusters = load(path)
     if not same_vessels(clusters.vessels, job.catalogue.vessels()):
-        own = ", ".join(clusters.catalogue)
-        raise ValueError(f"{path} must be of the catalogue asked for, but is of {own}: name it, or use --force")
-    return clusters if (len(clusters), int(clusters.seed)) == (job.count, job.seed) else None
+        names = ", ".join(clusters.catalogue)
+        raise ValueError(f"{path} must be of the catalogue asked for, but is of {names}: name it, or use --force")
+    own = (len(clusters), int(clusters.seed), tuple(clusters.classes))
+    return clusters if own == (job.count, job.seed, job.catalogue.classes) else None
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m shipshape_lab.simulator.datasets",
         description="Makes a data set of simulated clusters (NAME.npz) and its hulls' complete surfaces.",
-        epilog="example: python -m shipshape_lab.simulator.datasets train --out runs/data --seed 1 --jobs 2",
+        epilog="sets:\n"
+        + "\n".join(f"  {name:<12}{text}" for name, text in ABOUT.items())
+        + "\n\nexample: python -m shipshape_lab.simulator.datasets train --out runs/data --seed 1 --jobs 2",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("set", choices=sorted(SEEDS), help="train, validation, H (hard test) or P (paper grid)")
+    parser.add_argument("set", choices=tuple(SEEDS), metavar="SET", help=", ".join(SEEDS))
     parser.add_argument("--out", type=Path, required=True, help="folder for the files")
     parser.add_argument("--catalogue", type=Path, help="TOML file of the vessels to know (default: five types)")
+    parser.add_argument(
+        "--meshes", type=Path, help="U: folder of real hulls (.ply, metres, bow +x) to show beside the generated"
+    )
     parser.add_argument("--count", type=int, help="clusters to make; the first ones of the grid for P")
     parser.add_argument("--seed", type=int, help="seed of the set's chance")
+    parser.add_argument("--hulls", type=int, help="only the first so many hulls of each class")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     parser.add_argument("--force", action="store_true", help="make it again even if it is there")
     return parser

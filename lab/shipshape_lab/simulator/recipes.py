@@ -5,14 +5,14 @@ disjoint, drawn ranges stay 0.5 m away from multiples of 10 m, and drawn heading
 whole degrees, where the paper grid lies.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shipshape_lab.simulator.occluders import BoxOccluder
 from shipshape_lab.simulator.scan import Conditions
 from shipshape_lab.simulator.sea import MODERATE_SEA, Placement, SeaState
-from shipshape_lab.simulator.sensor import HDL64E, OS1_64, PANDAR64, Lidar
+from shipshape_lab.simulator.sensor import DEFAULT_LIDAR, HDL64E, OS1_64, PANDAR64, Lidar
 
 TRAIN_HULLS = range(0, 120)
 VALIDATION_HULLS = range(1000, 1012)
@@ -33,19 +33,33 @@ class Recipe:
     Attributes:
         hulls: seeds of hull variations to pick from.
         bands: (share, nearest, farthest) of the ranges, metres.
-        shares: of clusters that show a vessel of the catalogue, a type outside of it, and a stranger.
-        sea: the sea in half of the clusters; the other half is calm.
+        shares: of clusters that show a vessel of the catalogue, a type outside of it, a stranger, and an outsider.
+        lidars: (share, sensor).
+        sensor_heights: lowest and highest above the water, metres.
+        sea: the sea in half of the clusters; the other half is calm. None for a calm sea in all.
         occluded_share: share of clusters behind an occluder.
         max_dropout: dropout is uniform from 0 to this.
     """
 
     hulls: range
     bands: tuple[tuple[float, float, float], ...] = ((0.65, 25.0, 125.0), (0.35, 125.0, 200.0))
-    shares: tuple[float, float, float] = (0.65, 0.23, 0.12)
-    sea: SeaState = MODERATE_SEA
+    shares: tuple[float, float, float, float] = (0.65, 0.23, 0.12, 0.0)
+    lidars: tuple[tuple[float, Lidar], ...] = ((0.6, PANDAR64), (0.2, OS1_64), (0.2, HDL64E))
+    sensor_heights: tuple[float, float] = (2.0, 6.0)
+    sea: SeaState | None = MODERATE_SEA
     occluded_share: float = 0.2
     max_dropout: float = 0.25
 
+
+# As the paper grid is scanned, but off its distances and headings.
+CALM_TEST = Recipe(
+    TEST_HULLS,
+    lidars=((1.0, DEFAULT_LIDAR),),
+    sensor_heights=(GRID_SENSOR_HEIGHT, GRID_SENSOR_HEIGHT),
+    sea=None,
+    occluded_share=0.0,
+    max_dropout=0.0,
+)
 
 RECIPES = {
     "train": Recipe(TRAIN_HULLS),
@@ -53,16 +67,20 @@ RECIPES = {
     "H": Recipe(
         TEST_HULLS,
         bands=((1.0, 30.0, 200.0),),
-        shares=(0.5, 0.5, 0.0),
+        shares=(0.5, 0.5, 0.0, 0.0),
         occluded_share=0.3,
         max_dropout=0.3,
     ),
+    "far": replace(CALM_TEST, bands=((1.0, 110.0, 180.0),), shares=(1.0, 0.0, 0.0, 0.0)),
+    # The ranges and conditions of P, so that known and unknown differ by what they are and by nothing else.
+    "U": replace(CALM_TEST, bands=((1.0, 30.0, 110.0),), shares=(0.0, 0.0, 0.0, 1.0)),
 }
 
 
-def draw_lidar(rng: np.random.Generator) -> Lidar:
-    """The default sensor in 60 % of draws, each of the two others in 20 %."""
-    return (PANDAR64, OS1_64, HDL64E)[rng.choice(3, p=(0.6, 0.2, 0.2))]
+def draw_lidar(recipe: Recipe, rng: np.random.Generator) -> Lidar:
+    """One of the recipe's sensors."""
+    shares, lidars = zip(*recipe.lidars, strict=True)
+    return lidars[rng.choice(len(lidars), p=shares)]
 
 
 def draw_band(recipe: Recipe, rng: np.random.Generator) -> tuple[float, float]:
@@ -87,13 +105,15 @@ def draw_heading(rng: np.random.Generator) -> float:
     return float(np.radians(whole + rng.uniform(HEADING_GAP_DEG * 1.01, 1.0 - HEADING_GAP_DEG * 1.01)))
 
 
-def draw_placement(band: tuple[float, float], rng: np.random.Generator) -> Placement:
-    """A range in the band, any bearing, a sensor 2 to 6 m above the water."""
+def draw_placement(
+    band: tuple[float, float], rng: np.random.Generator, sensor_heights: tuple[float, float] = (2.0, 6.0)
+) -> Placement:
+    """A range in the band, any bearing, a sensor between two heights above the water, metres."""
     return Placement(
         range_m=draw_range(band, rng),
         heading=draw_heading(rng),
         bearing=float(rng.uniform(-np.pi, np.pi)),
-        sensor_height=float(rng.uniform(2.0, 6.0)),
+        sensor_height=float(rng.uniform(*sensor_heights)),
     )
 
 

@@ -49,6 +49,7 @@ class Scan:
         T_level_vessel: pose of the vessel, roll, pitch and heave included, shape (4, 4), float64.
         vessel_name: type name of the hull.
         vessel_seed: seed of the hull's variation, None for the nominal hull.
+        hidden_share: share of the returns that occluders took away, 0 to 1; 0 where there was nothing to take.
     """
 
     points_level: np.ndarray
@@ -56,6 +57,7 @@ class Scan:
     T_level_vessel: np.ndarray
     vessel_name: str
     vessel_seed: int | None
+    hidden_share: float = 0.0
 
     @property
     def range_m(self) -> float:
@@ -110,14 +112,16 @@ def scan_vessel(
     directions = lidar.directions(azimuth=azimuth, elevation=elevation, phase=phase)
     hits = cast(vessel, T_level_vessel, directions)
     returned = rng.random(len(directions)) < lidar.return_probability(hits.ranges, hits.cosines)
+    seen = returned.copy()
     for occluder in conditions.occluders:
-        returned &= hits.ranges <= occluder.ranges(directions)
-    directions, ranges = directions[returned], hits.ranges[returned]
+        seen &= hits.ranges <= occluder.ranges(directions)
+    directions, ranges = directions[seen], hits.ranges[seen]
     kept = rng.random(len(ranges)) >= conditions.lost_share(ranges)
     noisy = ranges[kept] + rng.normal(0.0, lidar.range_noise_sd, np.count_nonzero(kept))
     points = (directions[kept] * noisy[:, None]).astype(np.float32)
     dry = points[:, 2] >= -placement.sensor_height
-    return Scan(points[dry], placement, T_level_vessel, vessel.name, vessel.seed)
+    hidden_share = 1.0 - seen.sum() / returned.sum() if returned.any() else 0.0
+    return Scan(points[dry], placement, T_level_vessel, vessel.name, vessel.seed, hidden_share)
 
 
 def angular_window(vessel: Vessel, T_level_vessel: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
