@@ -140,5 +140,7 @@ def test_the_ablation_names_the_best_cell():
         numbers["validation.ablation.full_side.best_r_cm"],
         numbers["validation.ablation.full_side.best_d_cm"],
     ) == (70, 40)
+    assert numbers["validation.ablation.full_side.lead"] == pytest.approx(0.2)
+    assert numbers["validation.ablation.full_side.lead_error"] == pytest.approx(np.sqrt(0.2 * 0.8 / 10))
     page = ablation_page.section(numbers, {})
     assert "40.00 % at 0.5 and 0.5; best 60.00 % at r = 0.7, d_min = 0.4; worst 40.00 %" in page

@@ -32,8 +32,9 @@ def _line(numbers: Numbers, system: str, title: str) -> str:
     cells = {key.removeprefix(prefix): value for key, value in numbers.items() if key.startswith(f"{prefix}r_")}
     best, worst = (f"{100 * pick(cells.values()):.2f} %" for pick in (max, min))
     r, d = (numbers[f"{prefix}best_{what}_cm"] / 100 for what in ("r", "d"))
-    chance = 100 * (cells[_SERVED] * (1 - cells[_SERVED]) / numbers["validation.ablation.clusters"]) ** 0.5
+    lead, error = (100 * numbers[prefix + name] for name in ("lead", "lead_error"))
     return (
         f"{title}: {100 * cells[_SERVED]:.2f} % at 0.5 and 0.5; best {best} at r = {r:.1f}, d_min = {d:.1f}; "
-        f"worst {worst}. The standard error of a cell is {chance:.2f} points."
+        f"worst {worst}. The best cell leads by {lead:.2f} points, standard error {error:.2f} (paired); "
+        "chance flatters it, as the best of 64."
     )
