@@ -154,7 +154,7 @@ def show_single(address: str) -> None:
 
 def print_answers(results: list[pb.ContactResult], truths: list[tuple[str, float]]) -> None:
     """A line a contact, with the truth beside it."""
-    line = "{:7}  {:30} {:>6}  {:>14} {:>6} {:>6}  {:>18} {:>8} {:>8}   {}".format
+    line = "{:7}  {:30} {:>6}  {:>14} {:>6} {:>6}  {:>18} {:>8} {:>8}  {:28}  {}".format
     print(
         line(
             "contact",
@@ -167,6 +167,7 @@ def print_answers(results: list[pb.ContactResult], truths: list[tuple[str, float
             "measured",
             "inferred",
             "truth",
+            "unsure because",
         )
     )
     for result, (vessel, heading) in zip(results, truths, strict=True):
@@ -187,6 +188,7 @@ def print_answers(results: list[pb.ContactResult], truths: list[tuple[str, float
                 found.measured_points,
                 found.inferred_points,
                 truth,
+                ", ".join(pb.Reason.Name(reason).removeprefix("REASON_").lower() for reason in found.reasons),
             )
         )
 

@@ -178,3 +178,22 @@ def test_a_catalogue_of_another_length_than_the_networks_classes_is_refused_in_o
     expected = rf"^expected spd2_full_top to tell {CLASSES - 1} classes, .*, got a network for {CLASSES}$"
     with pytest.raises(BundleError, match=expected):
         check_fit(replace(bundle, models=networks))
+
+
+def test_a_bundle_of_before_there_were_reasons_fits():
+    assert "reasons" not in PARAMETERS
+    check_fit(untrained_bundle())
+    check_fit(with_reasons({"few_points": 40}))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("few_points", -1), ("few_points", 2.5), ("end_on_deg", 91.0), ("occluded_above", 1.5), ("bow_below", "0.9")],
+)
+def test_a_threshold_of_a_reason_that_cannot_be_is_refused(key, value):
+    with pytest.raises(BundleError, match=rf"^expected another value of parameters\.reasons\.{key}\b.*, got "):
+        check_fit(with_reasons({key: value}))
+
+
+def with_reasons(table):
+    return replace(untrained_bundle(), parameters={**PARAMETERS, "reasons": table})

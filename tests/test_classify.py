@@ -17,6 +17,7 @@ KEYS = [
     "probability",
     "probabilities",
     "unknown",
+    "reasons",
     "heading",
     "heading_std",
     "bow_probability",

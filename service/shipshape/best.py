@@ -24,7 +24,8 @@ class BestMethod:
             work.contact.points_level, pose, self._models["aligned"], looks=self._parameters["looks"]
         )
         work.pose = work.look.pose
-        work.heading_std = work.look.heading_std * self._parameters["heading_std_scale"]
+        power = self._parameters.get("heading_std_power", 1.0)  # older bundles scale alone
+        work.heading_std = self._parameters["heading_std_scale"] * work.look.heading_std**power
 
     def bow_stern(self, work: Work) -> None:
         """The last aligned look also saw the bow."""

@@ -163,16 +163,25 @@ class _Paper(_StageTable):
 class _Best(_StageTable):
     looks: Annotated[int, Field(ge=1, le=10)]
     heading_std_scale: _Positive
+    heading_std_power: _Positive = 1.0
     bow_temperature: _Positive
     fusion_weights: Annotated[
         list[_Finite], Field(min_length=4, max_length=4)
     ]  # prior, look, bottleneck, restored
 
 
+class _Reasons(_StageTable):
+    few_points: Annotated[int, Field(ge=0)] = 0
+    end_on_deg: Annotated[float, Field(ge=0, le=90)] = 0.0
+    occluded_above: _Share = 1.0
+    bow_below: _Share = 0.0
+
+
 class _Parameters(_StageTable):
     common: _Common
     paper: _Paper
     best: _Best
+    reasons: _Reasons = _Reasons()  # bundles of before there were reasons have none
 
 
 _Metres = Annotated[float, Field(gt=0, le=1000)]

@@ -86,6 +86,7 @@ def to_record(outcome: Outcome) -> dict[str, Any]:
         "probability": recognition.probability,
         "probabilities": dict(recognition.probabilities),
         "unknown": recognition.unknown,
+        "reasons": list(recognition.reasons),
         "heading": recognition.heading,
         "heading_std": recognition.heading_std,
         "bow_probability": recognition.bow_probability,

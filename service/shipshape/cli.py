@@ -27,6 +27,7 @@ files (metres, level frame: origin at the LiDAR, x ahead, y to port, z up):
 --json prints one object a cluster and line:
   file, index           where the cluster came from
   vessel, probability, probabilities, unknown
+  reasons               why to trust it less: few_points, end_on, occluded, bow_uncertain, out_of_catalogue
   heading, heading_std  radians, counter-clockwise from ahead; bow_probability that it is not the opposite
   aspect_deg            0 bow-on, 90 abeam, 180 stern-on
   box                   center (level frame), length, beam, height; metres

@@ -16,6 +16,7 @@ from shipshape import frames, sight
 from shipshape.best import BestMethod
 from shipshape.bundle import UNKNOWN, Bundle, check_fit
 from shipshape.paper import PaperMethod
+from shipshape.reasons import measure, reasons_of
 from shipshape.stages import keypoints, prior, spd2
 from shipshape.stages.keypoints import KeypointParams
 from shipshape.types import Box, Contact, ImagePair, Options, Preset, Recognition
@@ -48,6 +49,7 @@ class Pipeline:
         }
         self._names = [vessel.name for vessel in bundle.catalogue]
         self._common = bundle.parameters["common"]
+        self._thresholds = bundle.parameters.get("reasons", {})
         self.stages = (
             Stage("prior", self._prior),
             Stage("heading", lambda work: self._method(work).heading(work)),
@@ -89,11 +91,13 @@ class Pipeline:
         best = int(np.argmax(work.probabilities[:-1]))
         own = work.contact.own_true_heading_deg
         pose = work.pose
+        unknown = self._is_unknown(work)
         return Recognition(
             vessel=self._names[best],
             probability=float(work.probabilities[best]),
             probabilities=dict(zip([*self._names, UNKNOWN], map(float, work.probabilities), strict=True)),
-            unknown=self._is_unknown(work),
+            unknown=unknown,
+            reasons=reasons_of(measure(work), unknown=unknown, thresholds=self._thresholds),
             heading=pose.heading,
             heading_std=work.heading_std,
             bow_probability=work.bow_probability,

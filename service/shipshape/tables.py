@@ -30,6 +30,7 @@ ANSWER_COLUMNS = (
     Column("measured", 8),
     Column("inferred", 8),
     Column("ms", 6),
+    Column("unsure because", 14, left=True),
 )
 
 
@@ -70,6 +71,7 @@ def _cells(recognition: Recognition) -> tuple[str, ...]:
         f"{recognition.measured_points}",
         f"{recognition.inferred_points}",
         f"{sum(recognition.stage_ms.values()):.1f}",
+        ", ".join(recognition.reasons),
     )
 
 

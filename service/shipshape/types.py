@@ -39,6 +39,16 @@ class ImageMethod(StrEnum):
     Z_SIDE = "z_side"
 
 
+class Reason(StrEnum):
+    """Why an answer is less sure than most; `reasons` says exactly when each is given."""
+
+    FEW_POINTS = "few_points"
+    END_ON = "end_on"
+    OCCLUDED = "occluded"
+    BOW_UNCERTAIN = "bow_uncertain"
+    OUT_OF_CATALOGUE = "out_of_catalogue"
+
+
 @dataclass(frozen=True, slots=True)
 class Contact:
     """One vessel to recognise: its cluster in the level frame and what the caller knows beside it."""
@@ -123,6 +133,9 @@ class Recognition:
     probability: float
     probabilities: Mapping[str, float]  # every catalogue vessel and "unknown"; sums to 1
     unknown: bool  # true: better treated as not in the catalogue
+    reasons: tuple[
+        Reason, ...
+    ]  # why to trust this answer less, in the order of `Reason`; empty: nothing speaks against it
     heading: float  # rad
     heading_std: float  # rad, of the heading modulo pi
     bow_probability: float  # that the bow points along `heading` and not the opposite way

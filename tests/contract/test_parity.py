@@ -14,6 +14,7 @@ from serving.fakes import PATIENCE, cluster, request, rows
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.grpc.guard import STATUS as GRPC_STATUS
 from shipshape.serving.rest.problems import STATUS as REST_STATUS
+from shipshape.types import Reason
 from shipshape.v1 import shipshape_pb2 as pb
 
 GOOD = cluster()
@@ -237,6 +238,18 @@ def test_no_bytes_are_an_internal_error(doors, raw):
         assert response.status_code in (200, 400, 422)
     call = doors.channel.unary_unary("/shipshape.v1.Shipshape/Recognise").future(raw, timeout=PATIENCE)
     assert call.code() in (grpc.StatusCode.OK, grpc.StatusCode.INVALID_ARGUMENT)
+
+
+def test_both_doors_give_the_same_reasons(doors):
+    by_grpc = doors.stub.Recognise(request(GOOD), timeout=PATIENCE).recognition.reasons
+    by_rest = doors.rest.post("/v1/recognise", json={"points": rows(GOOD)}).json()["reasons"]
+    assert [pb.Reason.Name(number).removeprefix("REASON_").lower() for number in by_grpc] == by_rest
+    assert by_rest == ["few_points", "end_on"]
+
+
+def test_every_reason_has_a_number():
+    names = {name.removeprefix("REASON_").lower() for name in pb.Reason.keys()}  # noqa: SIM118  an enum, no dict
+    assert names == {*Reason, "unspecified"}
 
 
 def test_every_kind_has_a_status_in_both_tables():

@@ -35,6 +35,7 @@ def test_one_contact(doors):
     }
     assert (found.heading, found.heading_std, found.bow_probability) == (0.5, 0.0625, 0.875)
     assert (found.aspect_deg, found.true_heading_deg) == (30, 10)
+    assert list(found.reasons) == [pb.REASON_FEW_POINTS, pb.REASON_END_ON]
     assert (found.box.center.x, found.box.length, found.box.beam, found.box.height) == (40, 20, 8, 10)
     assert (found.measured_points, found.inferred_points) == (40, 40)
     assert np.allclose([[p.x, p.y, p.z] for p in found.keypoints], POINTS[:3])

@@ -19,7 +19,7 @@ from shipshape.render.style import (
     TITLE_HEIGHT,
     WIDTH,
 )
-from shipshape.render.text_panels import draw_probabilities, draw_stages, draw_title
+from shipshape.render.text_panels import draw_probabilities, draw_reasons, draw_stages, draw_title
 from shipshape.types import Contact, Recognition
 
 _TOP = 106.0
@@ -79,6 +79,7 @@ def _draw_foot(canvas: Canvas, recognition: Recognition) -> None:
     left = Rect(MARGIN, _FOOT_TOP, split - MARGIN - GAP / 2, height)
     right = Rect(split + GAP / 2, _FOOT_TOP, WIDTH - MARGIN - split - GAP / 2, height)
     _frame(canvas, left, "Which vessel")
+    draw_reasons(canvas, left.right - 16, left.y + 23, recognition)
     draw_probabilities(canvas, Rect(left.x + 16, left.y + 32, left.width - 32, height - 40), recognition)
     _frame(canvas, right, "Time, milliseconds a stage")
     draw_stages(canvas, Rect(right.x + 16, right.y + 34, right.width - 32, height - 42), recognition)

@@ -59,6 +59,12 @@ def draw_probabilities(canvas: Canvas, area: Rect, recognition: Recognition) -> 
         canvas.text(f"{probability:.1%}", (area.right, y + 5), font)
 
 
+def draw_reasons(canvas: Canvas, right: float, baseline: float, recognition: Recognition) -> None:
+    """Why to trust the answer less, in one line that ends at `right`."""
+    words = "   ·   ".join(_spoken(reason) for reason in recognition.reasons)
+    canvas.text(words, (right, baseline), Font(ALARM, 13.0, 500, anchor="right"))
+
+
 def draw_stages(canvas: Canvas, area: Rect, recognition: Recognition) -> None:
     """One bar as long as the whole pipeline, a piece for each stage, and the milliseconds in words."""
     total = sum(recognition.stage_ms.values())

@@ -21,6 +21,15 @@ class ImageMethod(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     IMAGE_METHOD_Z_TOP: _ClassVar[ImageMethod]
     IMAGE_METHOD_Z_SIDE: _ClassVar[ImageMethod]
 
+class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    REASON_UNSPECIFIED: _ClassVar[Reason]
+    REASON_FEW_POINTS: _ClassVar[Reason]
+    REASON_END_ON: _ClassVar[Reason]
+    REASON_OCCLUDED: _ClassVar[Reason]
+    REASON_BOW_UNCERTAIN: _ClassVar[Reason]
+    REASON_OUT_OF_CATALOGUE: _ClassVar[Reason]
+
 class ErrorKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     ERROR_KIND_UNSPECIFIED: _ClassVar[ErrorKind]
@@ -40,6 +49,12 @@ IMAGE_METHOD_FULL_TOP: ImageMethod
 IMAGE_METHOD_FULL_SIDE: ImageMethod
 IMAGE_METHOD_Z_TOP: ImageMethod
 IMAGE_METHOD_Z_SIDE: ImageMethod
+REASON_UNSPECIFIED: Reason
+REASON_FEW_POINTS: Reason
+REASON_END_ON: Reason
+REASON_OCCLUDED: Reason
+REASON_BOW_UNCERTAIN: Reason
+REASON_OUT_OF_CATALOGUE: Reason
 ERROR_KIND_UNSPECIFIED: ErrorKind
 ERROR_KIND_INVALID_INPUT: ErrorKind
 ERROR_KIND_TOO_LARGE: ErrorKind
@@ -125,7 +140,7 @@ class ContactError(_message.Message):
     def __init__(self, kind: _Optional[_Union[ErrorKind, str]] = ..., message: _Optional[str] = ...) -> None: ...
 
 class Recognition(_message.Message):
-    __slots__ = ("contact_id", "vessel", "probability", "probabilities", "unknown", "heading", "heading_std", "bow_probability", "aspect_deg", "true_heading_deg", "box", "measured_points", "inferred_points", "keypoints", "rung", "preset", "image_method", "bundle", "stages", "restored", "images", "rendered_png")
+    __slots__ = ("contact_id", "vessel", "probability", "probabilities", "unknown", "heading", "heading_std", "bow_probability", "aspect_deg", "true_heading_deg", "box", "measured_points", "inferred_points", "keypoints", "rung", "preset", "image_method", "bundle", "stages", "restored", "images", "rendered_png", "reasons")
     CONTACT_ID_FIELD_NUMBER: _ClassVar[int]
     VESSEL_FIELD_NUMBER: _ClassVar[int]
     PROBABILITY_FIELD_NUMBER: _ClassVar[int]
@@ -148,6 +163,7 @@ class Recognition(_message.Message):
     RESTORED_FIELD_NUMBER: _ClassVar[int]
     IMAGES_FIELD_NUMBER: _ClassVar[int]
     RENDERED_PNG_FIELD_NUMBER: _ClassVar[int]
+    REASONS_FIELD_NUMBER: _ClassVar[int]
     contact_id: str
     vessel: str
     probability: float
@@ -170,7 +186,8 @@ class Recognition(_message.Message):
     restored: RestoredCloud
     images: ImagePair
     rendered_png: bytes
-    def __init__(self, contact_id: _Optional[str] = ..., vessel: _Optional[str] = ..., probability: _Optional[float] = ..., probabilities: _Optional[_Iterable[_Union[NamedProbability, _Mapping]]] = ..., unknown: _Optional[bool] = ..., heading: _Optional[float] = ..., heading_std: _Optional[float] = ..., bow_probability: _Optional[float] = ..., aspect_deg: _Optional[float] = ..., true_heading_deg: _Optional[float] = ..., box: _Optional[_Union[Box, _Mapping]] = ..., measured_points: _Optional[int] = ..., inferred_points: _Optional[int] = ..., keypoints: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., rung: _Optional[str] = ..., preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., restored: _Optional[_Union[RestoredCloud, _Mapping]] = ..., images: _Optional[_Union[ImagePair, _Mapping]] = ..., rendered_png: _Optional[bytes] = ...) -> None: ...
+    reasons: _containers.RepeatedScalarFieldContainer[Reason]
+    def __init__(self, contact_id: _Optional[str] = ..., vessel: _Optional[str] = ..., probability: _Optional[float] = ..., probabilities: _Optional[_Iterable[_Union[NamedProbability, _Mapping]]] = ..., unknown: _Optional[bool] = ..., heading: _Optional[float] = ..., heading_std: _Optional[float] = ..., bow_probability: _Optional[float] = ..., aspect_deg: _Optional[float] = ..., true_heading_deg: _Optional[float] = ..., box: _Optional[_Union[Box, _Mapping]] = ..., measured_points: _Optional[int] = ..., inferred_points: _Optional[int] = ..., keypoints: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., rung: _Optional[str] = ..., preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., restored: _Optional[_Union[RestoredCloud, _Mapping]] = ..., images: _Optional[_Union[ImagePair, _Mapping]] = ..., rendered_png: _Optional[bytes] = ..., reasons: _Optional[_Iterable[_Union[Reason, str]]] = ...) -> None: ...
 
 class NamedProbability(_message.Message):
     __slots__ = ("name", "probability")

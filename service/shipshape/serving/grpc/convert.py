@@ -11,7 +11,7 @@ from shipshape.errors import InvalidInput
 from shipshape.serving.core import Answer, Model
 from shipshape.serving.encoding import Limits, Wishes, flat_scores, make_contact, pack, points_from_bytes
 from shipshape.serving.faults import Fault, FaultKind
-from shipshape.types import Box, Contact, ImageMethod, Options, Preset, RestoredCloud
+from shipshape.types import Box, Contact, ImageMethod, Options, Preset, Reason, RestoredCloud
 from shipshape.v1 import shipshape_pb2 as pb
 
 T = TypeVar("T", bound=StrEnum)
@@ -23,6 +23,7 @@ IMAGE_METHODS = {
     pb.IMAGE_METHOD_Z_TOP: ImageMethod.Z_TOP,
     pb.IMAGE_METHOD_Z_SIDE: ImageMethod.Z_SIDE,
 }
+REASONS = {reason: f"REASON_{reason.name}" for reason in Reason}
 ERROR_KINDS = {kind: f"ERROR_KIND_{kind.name}" for kind in FaultKind}
 _PRESET_NUMBERS = {preset: number for number, preset in PRESETS.items()}
 _IMAGE_METHOD_NUMBERS = {method: number for number, method in IMAGE_METHODS.items()}
@@ -78,6 +79,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
         probability=found.probability,
         probabilities=[pb.NamedProbability(name=n, probability=p) for n, p in found.probabilities.items()],
         unknown=found.unknown,
+        reasons=[REASONS[reason] for reason in found.reasons],
         heading=found.heading,
         heading_std=found.heading_std,
         bow_probability=found.bow_probability,

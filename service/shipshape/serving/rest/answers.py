@@ -33,6 +33,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> Json:
         "probability": found.probability,
         "probabilities": dict(found.probabilities),
         "unknown": found.unknown,
+        "reasons": list(found.reasons),
         "heading": found.heading,
         "heading_std": found.heading_std,
         "bow_probability": found.bow_probability,

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
-from shipshape.types import ImageMethod, Preset
+from shipshape.types import ImageMethod, Preset, Reason
 
 Points = Annotated[
     Any,  # checked by `encoding.points_from_rows`: a validator a number would cost more than the recognition
@@ -119,6 +119,7 @@ class RecognitionAnswer(BaseModel):
     probability: float = Field(description="Of vessel, 0 to 1.")
     probabilities: dict[str, float] = Field(description="Of every vessel and of unknown; they sum to 1.")
     unknown: bool = Field(description="Better treated as a vessel outside the catalogue.")
+    reasons: list[Reason] = Field(description="Why to trust this answer less; empty: nothing speaks against it.")
     heading: float = Field(description="Radians counter-clockwise from +x of the level frame, (-pi, pi].")
     heading_std: float = Field(description="Standard deviation of the heading modulo pi, radians.")
     bow_probability: float = Field(description="That the bow points along heading, 0 to 1.")

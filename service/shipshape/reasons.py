@@ -1,0 +1,95 @@
+"""Reason codes: when an answer is less sure than most, and why.
+
+Each rule compares one measure of the finished work with one threshold in `[parameters.reasons]` of the manifest:
+
+few_points        fewer points than `few_points`
+end_on            the line of sight is closer than `end_on_deg` to the vessel's long axis
+occluded          the share of the silhouette that is missing is over `occluded_above`
+bow_uncertain     the bow probability is below `bow_below`
+out_of_catalogue  the answer is "unknown"; its threshold is `common.unknown_above`
+
+`training/reason_thresholds.py` of the lab fits the thresholds for preset `best` on the validation set. A bundle
+without a threshold never gives that code. Preset `paper` is held to the same thresholds.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+
+from shipshape import frames
+from shipshape.types import Reason, RestoredCloud
+from shipshape.work import Work
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """What the rules look at."""
+
+    points: int  # of the cluster
+    off_ends_deg: float  # angle between the line of sight and the vessel's long axis: 0 end-on, 90 abeam
+    missing_share: float  # of the silhouette, as `missing_share` has it
+    bow_probability: float
+
+
+def measure(work: Work) -> Measures:
+    """The measures of a contact that has been restored."""
+    aspect = frames.aspect_deg(work.pose.heading, work.pose.origin_level)
+    return Measures(
+        points=len(work.contact.points_level),
+        off_ends_deg=min(aspect, 180.0 - aspect),
+        missing_share=missing_share(work.restored, work.sight.bearing, work.pose.origin_level[2]),
+        bow_probability=work.bow_probability,
+    )
+
+
+def reasons_of(found: Measures, *, unknown: bool, thresholds: Mapping[str, float]) -> tuple[Reason, ...]:
+    """The reasons that hold, in the order of `Reason`."""
+    holds = {
+        Reason.FEW_POINTS: found.points < thresholds.get("few_points", 0),
+        Reason.END_ON: found.off_ends_deg < thresholds.get("end_on_deg", 0.0),
+        Reason.OCCLUDED: found.missing_share > thresholds.get("occluded_above", 1.0),
+        Reason.BOW_UNCERTAIN: found.bow_probability < thresholds.get("bow_below", 0.0),
+        Reason.OUT_OF_CATALOGUE: unknown,
+    }
+    return tuple(reason for reason in Reason if holds[reason])
+
+
+# Wide enough that an empty column means something; these three were compared by ROC on the validation set.
+_POINTS_A_COLUMN = 6
+_FEWEST_COLUMNS, _MOST_COLUMNS = 4, 24
+
+
+def missing_share(restored: RestoredCloud, bearing: float, waterline: float) -> float:
+    """Share of the restored silhouette whose points are missing, as if something stood in front of it; 0 to 1.
+
+    The vessel as the sensor sees it is cut into upright columns of equal angle. A column of height h (restored,
+    above the water) with n measured points has the density n / h. What a column lacks to the median density of
+    those that were measured is missing, weighted by its height; a column denser than that lacks nothing.
+
+    Args:
+        restored: the whole vessel, level frame.
+        bearing: of the line of sight, radians counter-clockwise from +x of the level frame.
+        waterline: z of the water in the level frame, m.
+    """
+    if not restored.measured.any():  # preset paper: the whole cluster may lie outside its image
+        return 1.0
+    column, count = _columns(restored, bearing)
+    above = np.maximum(restored.points_level[:, 2] - np.float32(waterline), np.float32(0.01))
+    height = np.zeros(count, np.float32)
+    np.maximum.at(height, column, above)
+    measured = np.bincount(column[restored.measured], minlength=count)
+    density = measured / np.maximum(height, np.float32(0.01))
+    lack = np.maximum(1.0 - density / np.median(density[measured > 0]), 0.0)
+    return float((lack * height).sum() / height.sum())
+
+
+def _columns(restored: RestoredCloud, bearing: float) -> tuple[Int[np.ndarray, " m"], int]:
+    """Number of the column of each point, and how many columns there are."""
+    sight = restored.points_level[:, :2] @ frames.R_level_vessel(bearing).astype(np.float32)
+    angle = np.arctan2(sight[:, 1], sight[:, 0])
+    count = int(np.clip(np.count_nonzero(restored.measured) // _POINTS_A_COLUMN, _FEWEST_COLUMNS, _MOST_COLUMNS))
+    right, left = angle.min(), angle.max()
+    share = (angle - right) / max(left - right, np.float32(1e-6))
+    return np.minimum((share * count).astype(np.intp), count - 1), count
