@@ -1,16 +1,21 @@
 """What calibration fits must recover what the evidence was drawn with."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 pytest.importorskip("torch", reason="training needs torch, which only `make torch` installs")
 
+from shipshape.reasons import Measures
 from shipshape.softmax import softmax
 from shipshape_lab.training import train_all
 from shipshape_lab.training.calibrate import (
     KNOWN_KEPT,
     BestEvidence,
     best_parameters,
+    heading_spread,
+    judged,
     unknown_threshold,
     validation_scores,
 )
@@ -28,14 +33,17 @@ def seen():
         logits = rng.normal(0.0, 1.0, CLASSES) + 3.0 * (np.arange(CLASSES) == label)
         noise = rng.normal(0.0, 1.0, CLASSES)
         true_logit = rng.normal(0.0, 3.0)
+        said = float(rng.uniform(0.01, 0.05))
         evidence.append(
             BestEvidence(
-                turn_error=float(rng.normal(0.0, 0.04)),
-                heading_std=0.02,  # said to be half of what it is
+                turn_error=float(rng.normal(0.0, 2.0 * said)),
+                heading_std=said,  # half of what it is
                 flip_logit=3.0 * true_logit,  # three times too sure
                 flipped=bool(rng.random() < 1 / (1 + np.exp(-true_logit))),
                 witnesses=softmax(np.stack([logits, noise, noise, noise]).astype(np.float32)),
                 label=label,
+                measures=Measures(50, 60.0, 0.1, 0.9),
+                length_ratio=float(rng.choice([0.95, 1.2])),
             )
         )
     return evidence
@@ -43,8 +51,39 @@ def seen():
 
 def test_spread_and_temperature_undo_too_much_confidence(seen):
     found = best_parameters(seen)
-    assert found["heading_std_scale"] == pytest.approx(2.0, rel=0.1)
+    assert found["heading_std_power"] == pytest.approx(1.0, abs=0.1)
+    assert found["heading_std_scale"] * 0.03 ** found["heading_std_power"] == pytest.approx(0.06, rel=0.05)
     assert found["bow_temperature"] == pytest.approx(3.0, rel=0.15)
+
+
+def test_the_spread_follows_errors_that_grow_faster_than_what_is_said():
+    rng = np.random.default_rng(3)
+    said = np.exp(rng.uniform(np.log(0.005), np.log(0.1), 20_000))
+    scale, power = heading_spread(np.abs(rng.normal(0.0, 4.0 * said**1.3)), said)
+    assert (scale, power) == (pytest.approx(4.0, rel=0.1), pytest.approx(1.3, abs=0.03))
+
+
+def test_what_no_vessel_of_the_catalogue_is_has_no_part_in_the_pose(seen):
+    stray = [replace(e, turn_error=1.5, flipped=not e.flipped) for e in seen if e.label == CLASSES - 1]
+    vessels = [e for e in seen if e.label < CLASSES - 1]
+    found, alone = best_parameters(vessels + stray), best_parameters(vessels)
+    for name in ("heading_std_scale", "heading_std_power", "bow_temperature"):
+        assert found[name] == alone[name]
+
+
+def test_answers_are_judged_as_the_service_would_give_them(seen):
+    parameters = {
+        "common": {"unknown_above": 0.5},
+        "best": {"fusion_weights": [1.0, 0.0, 0.0, 0.0], "bow_temperature": 3.0},
+    }
+    found = judged(seen, parameters, np.full(len(seen), np.nan))
+    for e, right, certainty in list(zip(seen, found.named_right, found.bow_probability, strict=True))[:200]:
+        *known, unknown = e.witnesses[0]
+        said = CLASSES - 1 if unknown > min(max(known), 0.5) else int(np.argmax(known))
+        assert right == (said == e.label)
+        assert certainty == pytest.approx(max(1 / (1 + np.exp(s * e.flip_logit / 3.0)) for s in (1, -1)))
+    np.testing.assert_array_equal(found.length_right, [e.length_ratio == 0.95 for e in seen])
+    assert np.mean(found.bow_probability) == pytest.approx(np.mean(found.bow_right), abs=0.02)
 
 
 def test_a_witness_that_knows_outweighs_those_that_guess(seen):

@@ -1,7 +1,9 @@
 """Fit what a bundle measures rather than trains, on the validation set alone.
 
 Fitted: the prior's temperature; the paper's threshold of grey, sharpness of part votes and spread of heading; the
-best preset's spread of heading, temperature of the bow, weights of the evidence and threshold of "unknown".
+best preset's spread of heading, temperature of the bow, weights of the evidence and threshold of "unknown"; and
+from which value on each reason code is given (`reason_thresholds`). Whatever speaks of a pose is fitted on the
+catalogue's vessels alone: what a stray thing's heading would be means nothing.
 """
 
 import copy
@@ -16,6 +18,7 @@ from shipshape import frames, raster
 from shipshape.bundle import Bundle
 from shipshape.errors import Unprocessable
 from shipshape.pipeline import Pipeline
+from shipshape.reasons import Measures, measure
 from shipshape.softmax import softmax
 from shipshape.stages import bow_stern, classification, keypoints, prior, projection, spd2
 from shipshape.stages.keypoints import KeypointParams
@@ -23,7 +26,10 @@ from shipshape.types import ImageMethod, Options, Preset
 from shipshape.validation import ContactLimits, check_contact
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.partial import run_until
+from shipshape_lab.training.reason_thresholds import Judged, reason_thresholds
 
+ONE_STD = 0.683  # share of a normal distribution within one standard deviation
+LENGTH_RIGHT = 0.1  # a length is right within this share of the true one
 KNOWN_KEPT = 0.995  # share of catalogue vessels that the threshold of "unknown" must leave known
 
 
@@ -37,13 +43,18 @@ class BestEvidence:
     flipped: bool  # whether the bow truly pointed the other way
     witnesses: np.ndarray  # (4, classes) probabilities in the order that fusion weighs them
     label: int
+    measures: Measures  # its bow probability is not calibrated yet
+    length_ratio: float  # of the length found to the true one
 
 
 def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> tuple[dict, dict]:
     """The bundle's parameters, fitted, and the scores of preset `best` on the same set."""
     parameters = copy.deepcopy(dict(bundle.parameters))
     rng = np.random.default_rng(seed)
-    contacts = [e for e in (validation.drawn(int(i), rng) for i in validation.indices) if _is_accepted(e)]
+    drawn = [(int(i), validation.drawn(int(i), rng)) for i in validation.indices]
+    accepted = [(i, example) for i, example in drawn if _is_accepted(example)]
+    contacts = [example for _, example in accepted]
+    hidden_share = validation.clusters.hidden_share[[i for i, _ in accepted]]
     catalogue = [example for example in contacts if example.label < len(bundle.catalogue)]
     pipeline = Pipeline(bundle)
     parameters["common"]["prior_temperature"] = prior_temperature(pipeline, contacts)
@@ -53,6 +64,7 @@ def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> tuple[dict
     parameters["best"].update(best_parameters(seen))
     weights = parameters["best"]["fusion_weights"]
     parameters["common"]["unknown_above"] = unknown_threshold(seen, weights)
+    parameters["reasons"] = reason_thresholds(judged(seen, parameters, hidden_share))
     return parameters, validation_scores(seen, weights)
 
 
@@ -148,22 +160,63 @@ def _best_evidence(pipeline: Pipeline, example: Example) -> BestEvidence:
         flipped=math.cos(work.look.pose.heading - example.pose.heading) < 0,
         witnesses=np.stack([work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]),
         label=example.label,
+        measures=measure(work),
+        length_ratio=work.pose.size.length / example.pose.size.length,
     )
 
 
 def best_parameters(seen: list[BestEvidence]) -> dict:
     """Parameters of preset `best`."""
-    ratios = np.abs([e.turn_error / e.heading_std for e in seen])
-    signs = np.array([e.flip_logit * (1 if e.flipped else -1) for e in seen])
+    known = [e for e in seen if e.label < len(e.witnesses[0]) - 1]
+    scale, power = heading_spread(np.abs([e.turn_error for e in known]), np.array([e.heading_std for e in known]))
+    signs = np.array([e.flip_logit * (1 if e.flipped else -1) for e in known])
     temperature = minimize_scalar(
         lambda t: np.logaddexp(0, -signs / t).mean(), bounds=(0.2, 10.0), method="bounded"
     ).x
     return {
-        # Scaled so that 68 % of validation errors lie within one standard deviation.
-        "heading_std_scale": float(np.quantile(ratios, 0.683)),
+        "heading_std_scale": scale,
+        "heading_std_power": power,
         "bow_temperature": float(temperature),
         "fusion_weights": _fusion_weights(_log_witnesses(seen), _labels(seen)).tolist(),
     }
+
+
+def heading_spread(errors: np.ndarray, said: np.ndarray) -> tuple[float, float]:
+    """Scale and power of scale * said ** power, under which ONE_STD of the errors lie however large `said` is.
+
+    Quantile regression of log error on log said, both in radians: one factor for all would leave more of the
+    errors of near vessels, and fewer of far ones', within one standard deviation.
+    """
+    logs, middle = np.log(said), float(np.log(said).mean())
+    targets = np.log(np.maximum(errors, 1e-6))
+
+    def loss(line: np.ndarray) -> float:
+        miss = targets - line[0] - line[1] * (logs - middle)
+        return float(np.maximum(ONE_STD * miss, (ONE_STD - 1.0) * miss).mean())
+
+    start = [np.quantile(targets - logs, ONE_STD) + middle, 1.0]
+    level, power = minimize(loss, start, method="Nelder-Mead").x
+    return math.exp(level - power * middle), float(power)
+
+
+def judged(seen: list[BestEvidence], parameters: dict, hidden_share: np.ndarray) -> Judged:
+    """The answers that the fitted parameters give, beside the truth."""
+    fused, labels = _fused(seen, parameters["best"]["fusion_weights"]), _labels(seen)
+    known = fused[:, :-1].max(axis=1)
+    unknown = fused[:, -1] > np.minimum(known, parameters["common"]["unknown_above"])
+    named = np.where(unknown, fused.shape[1] - 1, fused[:, :-1].argmax(axis=1))
+    certainty = np.abs([e.flip_logit for e in seen]) / parameters["best"]["bow_temperature"]
+    return Judged(
+        points=np.array([e.measures.points for e in seen]),
+        off_ends_deg=np.array([e.measures.off_ends_deg for e in seen]),
+        missing_share=np.array([e.measures.missing_share for e in seen]),
+        bow_probability=1.0 / (1.0 + np.exp(-np.minimum(certainty, 30.0))),
+        catalogue=labels < fused.shape[1] - 1,
+        named_right=named == labels,
+        bow_right=np.array([(e.flip_logit > 0) == e.flipped for e in seen]),
+        length_right=np.abs(np.array([e.length_ratio for e in seen]) - 1.0) <= LENGTH_RIGHT,
+        hidden_share=hidden_share,
+    )
 
 
 def unknown_threshold(seen: list[BestEvidence], weights: list[float]) -> float:
