@@ -148,11 +148,11 @@ def test_the_temperature_of_logits_three_times_too_large_is_three():
 def workplace(tmp_path_factory):
     """A few clusters as both training and validation set, and networks of the pose."""
     folder = tmp_path_factory.mktemp("peers")
-    few = datasets.make(Job("train", 3, 7), progress=False)
+    few = datasets.make(Job("train", 6, 7), progress=False)
     hulls = {(few.name(i), int(few.hull_seed[i])) for i in range(len(few))}
     columns = {f.name: getattr(few, f.name) for f in fields(few) if f.init}
     made = ClusterSet(
-        **{name: x if name in ONCE_A_SET else np.concatenate([x] * 22) for name, x in columns.items()}
+        **{name: x if name in ONCE_A_SET else np.concatenate([x] * 14) for name, x in columns.items()}
     )
     surfaces = datasets.make_surfaces(sorted(hulls), progress=False)
     for name in ("train", "validation"):
