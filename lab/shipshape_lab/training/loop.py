@@ -101,6 +101,7 @@ def train(
     loss_of: Callable[[nn.Module, Batch], Tensor],
     schedule: Schedule,
     checkpoint: Path,
+    after_epoch: Callable[[int], None] = lambda done: None,
 ) -> nn.Module:
     """Train `net` in place and return it, in evaluation mode on the CPU.
 
@@ -110,6 +111,7 @@ def train(
         loss_of: network and batch to a scalar loss.
         schedule: epochs, batch, rate, seed.
         checkpoint: file that the state is kept in after every epoch; a run that was stopped goes on from it.
+        after_epoch: told how many epochs are done, before the checkpoint of them is written.
     """
     run = _Run(net, schedule.epochs * (len(data) // schedule.batch), schedule.rate)
     for epoch in range(run.resume(checkpoint), schedule.epochs):
@@ -119,6 +121,7 @@ def train(
         bar = tqdm(_loader(data, schedule, epoch), desc=title, leave=False, mininterval=2.0)
         losses = [run.step(batch, loss_of) for batch in bar]
         log.info("%s loss %.4f", title, float(np.mean(losses)))
+        after_epoch(epoch + 1)
         run.keep(checkpoint, epoch + 1)
     return net.cpu().eval()
 
