@@ -127,6 +127,8 @@ def test_a_real_mesh_can_be_an_entry(tmp_path):
         ('[[vessel]]\nname = "a"\nmesh = "meshes/barge.stl"\nscale = 0', "positive scale, but has 0"),
         ('[[vessel]]\nname = "a"\nmesh = "meshes/barge.stl"\nscale = nan', "finite number as scale"),
         ('[[vessel]]\nname = "a"\nmesh = "meshes/barge.stl"\nwaterline = "1"', "finite number as waterline"),
+        ('[[vessel]]\nname = "a"\nmesh = "meshes/barge.stl"\nup = "w"', "one of x, -x, .* as up, but has 'w'"),
+        ('[[vessel]]\nname = "a"\nmesh = "meshes/barge.stl"\nbow = "-z"', "two different axes, got -z and z"),
         (FLEET + FLEET.replace('"tug"', '"rhib"'), "name of its own, but has barge, harbour_tug, pontoon twice"),
         (FLEET + '[[vessel]]\nname = "b"\ntype = "tug"', "type of its own, but has tug twice"),
         ("".join(f'[[vessel]]\nname = "{n}"\ntype = "{n}"\n' for n in VESSEL_TYPES), "leave out one"),

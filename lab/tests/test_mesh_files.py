@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hulls import box_hull
 
-from shipshape_lab.simulator.mesh_files import load_vessel
+from shipshape_lab.simulator.mesh_files import Placing, load_vessel, read_placed
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "vessels"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="shared/data/vessels is not beside the repository")
@@ -35,6 +35,18 @@ def test_gltf_axes_are_turned(write):
     box.vertices = box.vertices[:, [1, 2, 0]]
     box.apply_translation([-5.0, 2.0, 1.0])
     assert load_vessel(write(".glb", box)).box == pytest.approx((20.0, 6.0, 4.0), abs=1e-5)
+
+
+def test_bow_and_up_turn_the_file(write):
+    # The bow at -y and up at -z, as a drawing seen from below may have it; scale and waterline come after.
+    box = box_hull().mesh
+    box.vertices = box.vertices @ np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    box.apply_translation([-5.0, 2.0, 1.0])
+    path = write(".ply", box)
+    placed = read_placed(path, Placing(scale=0.5, waterline=1.0, bow="-y", up="-z"))
+    assert placed.extents == pytest.approx((10.0, 3.0, 2.0), abs=1e-5)
+    assert placed.bounds[0, 2] == pytest.approx(-1.0, abs=1e-5)
+    assert np.linalg.det(Placing(bow="-y", up="-z").rotation(".ply")) == pytest.approx(1.0)
 
 
 def test_scale_and_waterline_apply(write):

@@ -11,13 +11,15 @@ A catalogue is read from a small TOML file, one table for each vessel; paths are
     mesh = "meshes/anna.stl"
     scale = 0.001        # metres in one unit of the mesh
     waterline = 1.2      # height of the waterline in the mesh's frame after scaling, metres
+    bow = "-y"           # the file's axis that points to the bow; x if left out, z in a GLB
+    up = "z"             # the file's axis that points up; z if left out, y in a GLB
 """
 
 import math
 import tomllib
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -26,7 +28,7 @@ import trimesh
 
 from shipshape.bundle import UNKNOWN, CatalogueVessel
 from shipshape.types import ReferenceBox
-from shipshape_lab.simulator.mesh_files import load_vessel
+from shipshape_lab.simulator.mesh_files import AXES, Placing, above_water, read_placed
 from shipshape_lab.simulator.outsiders import Outsider
 from shipshape_lab.simulator.strangers import STRANGER_TYPES, build_stranger
 from shipshape_lab.simulator.vessel import Vessel
@@ -52,12 +54,11 @@ class GeneratedVessel:
 
 @dataclass(frozen=True)
 class MeshVessel:
-    """A catalogue entry read from a mesh file; scale and waterline as in `load_vessel`."""
+    """A catalogue entry read from a mesh file, and how its mesh lies in the water."""
 
     name: str
     mesh: Path
-    scale: float = 1.0
-    waterline: float = 0.0
+    placing: Placing = field(default_factory=Placing)
 
     def build(self, seed: int | None) -> Vessel:
         """The file's hull (None), or a sister hull scaled about the origin by 3 % (sd) along each axis.
@@ -76,7 +77,7 @@ class MeshVessel:
 
 @cache
 def _read_hull(entry: MeshVessel) -> Vessel:
-    return load_vessel(entry.mesh, name=entry.name, scale=entry.scale, waterline=entry.waterline)
+    return above_water(entry.mesh, read_placed(entry.mesh, entry.placing), name=entry.name)
 
 
 Entry = GeneratedVessel | MeshVessel
@@ -189,15 +190,28 @@ def _entry(table: dict, folder: Path) -> Entry:
         raise ValueError(f"must have a name other than {UNKNOWN!r}, but has {name!r}")
     if ("type" in table) == ("mesh" in table):
         raise ValueError(f"({name}) must have either a type or a mesh, but has {sorted(table)}")
-    expected = {"name", "type"} if "type" in table else {"name", "mesh", "scale", "waterline"}
+    expected = {"name", "type"} if "type" in table else {"name", "mesh", "scale", "waterline", "bow", "up"}
     if not set(table) <= expected:
         raise ValueError(f"({name}) may have {sorted(expected)}, but has {sorted(set(table) - expected)} too")
     if "type" in table:
         return GeneratedVessel(name, _type(name, table["type"]))
+    mesh = _mesh(name, table["mesh"], folder)
+    return MeshVessel(name, mesh, _placing(name, table, mesh.suffix.lower()))
+
+
+def _placing(name: str, table: dict, suffix: str) -> Placing:
     scale, waterline = _number(table, "scale", 1.0), _number(table, "waterline", 0.0)
     if scale <= 0.0:
         raise ValueError(f"({name}) must have a positive scale, but has {scale}")
-    return MeshVessel(name, _mesh(name, table["mesh"], folder), scale, waterline)
+    for key in ("bow", "up"):
+        if str(table.get(key, "x")) not in AXES:
+            raise ValueError(f"({name}) must have one of {', '.join(AXES)} as {key}, but has {table[key]!r}")
+    placing = Placing(scale, waterline, table.get("bow"), table.get("up"))
+    try:
+        placing.rotation(suffix)
+    except ValueError as error:
+        raise ValueError(f"({name}): {error}") from None
+    return placing
 
 
 def _type(name: str, value: object) -> str:
