@@ -18,8 +18,15 @@ from shipshape_lab.training.partial import partial_bundle
 from shipshape_lab.training.quantise import quantise_all
 
 
-def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
+def build(data: Path, networks: Path, to: Path, *, seed: int, name: str = "default") -> Bundle:
     """The finished bundle in the folder `to`, read back and verified.
+
+    Args:
+        data: folder of the data sets.
+        networks: folder of the trained networks.
+        to: folder of the bundle.
+        seed: of the draws of the validation set.
+        name: of the bundle, as the service reports it.
 
     Raises:
         ValueError: the networks were trained for another catalogue than the validation set's.
@@ -38,7 +45,7 @@ def build(data: Path, networks: Path, to: Path, *, seed: int) -> Bundle:
         shutil.copyfile(file, to / file.name)
     return write_manifest(
         to,
-        name="default",
+        name=name,
         training={"commit": code_commit(), "seed": seed, "validation_clusters": len(validation)},
         catalogue=validation.catalogue,
         models={file.stem: Path(file.name) for file in files},
@@ -54,8 +61,9 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder whose bundle/ holds the trained networks")
     parser.add_argument("--to", type=Path, required=True, help="folder of the finished bundle")
     parser.add_argument("--seed", type=int, default=1, help="seed of the draws of the validation set")
+    parser.add_argument("--name", default="default", help="name of the bundle (default: default)")
     args = parser.parse_args(argv)
-    bundle = build(args.data, args.out / "bundle", args.to, seed=args.seed)
+    bundle = build(args.data, args.out / "bundle", args.to, seed=args.seed, name=args.name)
     print(f"bundle {bundle.name} {bundle.digest[:12]} with {len(bundle.models)} networks in {args.to}")
     for table, values in bundle.parameters.items():
         print(f"  {table}: {values}")

@@ -126,6 +126,12 @@ def train(
     return net.cpu().eval()
 
 
+def keep_start(net: nn.Module, data: Drawn, schedule: Schedule, checkpoint: Path) -> None:
+    """Write a checkpoint of no epoch yet: `train` starts from it with these weights and this schedule's rate."""
+    steps = schedule.epochs * (len(data) // schedule.batch)
+    _Run(net, steps, schedule.rate).keep(checkpoint, 0)
+
+
 def train_for_int8(
     net: nn.Module,
     draws: Callable[[int], Drawn],

@@ -15,33 +15,14 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from shipshape.types import ImageMethod
 from shipshape_lab.simulator.catalogue import DEFAULT, same_vessels
 from shipshape_lab.simulator.clusters import load_catalogue
 from shipshape_lab.training import build_bundle
+from shipshape_lab.training.waves import WAVES, network_file
 
 log = logging.getLogger(__name__)
 
 DATA_SETS = ("train", "validation")
-# Each wave needs the networks of the waves before it; the longest come first, so that the lanes end together.
-WAVES = (
-    (
-        ("inpainting",),
-        ("sight",),
-        ("aligned",),
-        *(("grey", "--method", method) for method in ImageMethod),
-        ("spd2", "--model", "prior"),
-        ("spd2", "--model", "parts"),
-    ),
-    (("spd2", "--model", "spd2"), *(("spd2", "--model", f"spd2_{method}") for method in ImageMethod)),
-)
-
-
-def network_file(step: tuple[str, ...]) -> str:
-    """The ONNX file that a training step leaves."""
-    if step[0] == "grey":
-        return f"inpainting_{step[-1]}.onnx"
-    return f"{step[-1] if step[0] == 'spd2' else step[0]}.onnx"
 
 
 def train_step(step: tuple[str, ...], work: Path) -> None:
@@ -53,7 +34,8 @@ def train_step(step: tuple[str, ...], work: Path) -> None:
     if (work / "default/bundle" / network_file(step)).exists():
         return
     folders = ["--data", str(work / "data"), "--out", str(work / "default"), "--threads", "1"]
-    _run(f"shipshape_lab.training.train_{step[0]}", [*step[1:], *folders], work, "_".join(step))
+    name = network_file(step).removesuffix(".onnx")
+    _run(f"shipshape_lab.training.train_{step[0]}", [*step[1:], *folders], work, name)
 
 
 def make_data(name: str, work: Path, lanes: int) -> None:
@@ -66,7 +48,7 @@ def make_data(name: str, work: Path, lanes: int) -> None:
 
 
 def _run(module: str, arguments: list[str], work: Path, name: str) -> None:
-    path = work / "logs" / f"{name.replace('--', '')}.log"
+    path = work / "logs" / f"{name}.log"
     path.parent.mkdir(parents=True, exist_ok=True)
     started = time.monotonic()
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
