@@ -16,15 +16,13 @@ from tqdm import tqdm
 
 from shipshape import frames, raster
 from shipshape.bundle import Bundle
-from shipshape.errors import Unprocessable
 from shipshape.pipeline import Pipeline
 from shipshape.reasons import Measures, measure
 from shipshape.softmax import softmax
 from shipshape.stages import bow_stern, classification, keypoints, prior, projection, spd2
 from shipshape.stages.keypoints import KeypointParams
 from shipshape.types import ImageMethod, Options, Preset
-from shipshape.validation import ContactLimits, check_contact
-from shipshape_lab.training.examples import Example, Examples
+from shipshape_lab.training.examples import Example, Examples, is_accepted
 from shipshape_lab.training.partial import run_until
 from shipshape_lab.training.reason_thresholds import Judged, reason_thresholds
 
@@ -52,7 +50,7 @@ def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> tuple[dict
     parameters = copy.deepcopy(dict(bundle.parameters))
     rng = np.random.default_rng(seed)
     drawn = [(int(i), validation.drawn(int(i), rng)) for i in validation.indices]
-    accepted = [(i, example) for i, example in drawn if _is_accepted(example)]
+    accepted = [(i, example) for i, example in drawn if is_accepted(example.contact)]
     contacts = [example for _, example in accepted]
     hidden_share = validation.clusters.hidden_share[[i for i, _ in accepted]]
     catalogue = [example for example in contacts if example.label < len(bundle.catalogue)]
@@ -66,14 +64,6 @@ def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> tuple[dict
     parameters["common"]["unknown_above"] = unknown_threshold(seen, weights)
     parameters["reasons"] = reason_thresholds(judged(seen, parameters, hidden_share))
     return parameters, validation_scores(seen, weights)
-
-
-def _is_accepted(example: Example) -> bool:
-    try:
-        check_contact(example.contact, ContactLimits())
-    except Unprocessable:  # a few points of a far end, too close together: the service would refuse it
-        return False
-    return True
 
 
 def _with(bundle: Bundle, parameters: dict) -> Bundle:

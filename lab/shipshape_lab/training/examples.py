@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from shipshape.errors import Unprocessable
 from shipshape.types import Contact, Pose, ReferenceBox
+from shipshape.validation import ContactLimits, check_contact
 from shipshape_lab.simulator.clusters import ClusterSet, Surfaces, load, load_surfaces
 
 MIN_POINTS = 10
@@ -81,6 +83,15 @@ class Examples:
             points = points[keep]
         height = example.contact.sensor_height if rng.random() < 0.5 else None
         return Example(Contact(points, sensor_height=height), example.pose, example.label, example.surface_level)
+
+
+def is_accepted(contact: Contact) -> bool:
+    """Whether the service would take the contact: a few far points may lie too close together for it."""
+    try:
+        check_contact(contact, ContactLimits())
+    except Unprocessable:
+        return False
+    return True
 
 
 def mirrored(example: Example) -> Example:

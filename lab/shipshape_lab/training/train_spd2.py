@@ -23,7 +23,7 @@ from shipshape.stages.bow_stern import PARTS
 from shipshape.stages.keypoints import KeypointParams
 from shipshape.types import ImageMethod, Options, Preset, ReferenceBox
 from shipshape_lab.training import arguments, export, loop
-from shipshape_lab.training.examples import Example, Examples
+from shipshape_lab.training.examples import Example, Examples, is_accepted
 from shipshape_lab.training.nets import Spd2Net
 from shipshape_lab.training.partial import UNCALIBRATED, partial_bundle, run_until
 from shipshape_lab.training.poses import paper_pose
@@ -76,11 +76,14 @@ def of_restored(pipeline: Pipeline, options: Options) -> Callable[[Example, np.r
 
 
 def collect(examples: Examples, describe: Callable, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Images (M, 5, 16, 32) as float16 and labels (M,) of every cluster, drawn once."""
+    """Images (M, 5, 16, 32) as float16 and labels (M,) of every cluster that the service accepts, drawn once."""
     images, labels = [], []
     for i in tqdm(examples.indices, desc="SPD2 images", mininterval=2.0):
         rng = np.random.default_rng([seed, i])
-        found, label = describe(examples.drawn(int(i), rng), rng)
+        example = examples.drawn(int(i), rng)
+        if not is_accepted(example.contact):
+            continue
+        found, label = describe(example, rng)
         images.append(found.astype(np.float16))
         labels.append(label)
     return np.concatenate(images), np.concatenate(labels).astype(np.int64)
