@@ -5,11 +5,11 @@ import sys
 
 COMMANDS = {
     "render": ("shipshape_lab.simulator.render", "picture of the simulated vessels beside real hulls"),
-    "data": ("shipshape_lab.simulator.datasets", "make a data set: train, validation, P or H"),
+    "data": ("shipshape_lab.simulator.datasets", "make a data set: train, validation, P, H, far or U"),
     "train": ("shipshape_lab.training.train_all", "make the default bundle from nothing"),
     "bundle": ("shipshape_lab.training.build_bundle", "calibrate trained networks and write their bundle"),
-    "evaluate": ("shipshape_lab.experiments.evaluate_p", "recognition on the paper grid P"),
-    "restoration": ("shipshape_lab.experiments.restoration_p", "restoration on the paper grid P"),
+    "evaluate": ("shipshape_lab.experiments.evaluate", "recognition on a test set: P, far, H or U"),
+    "restoration": ("shipshape_lab.experiments.restoration", "restoration on P or H"),
     "real": ("shipshape_lab.experiments.real_hulls", "what a bundle says of real hulls from mesh files"),
     "report": ("shipshape_lab.experiments.report", "tables and figures from the results"),
 }

@@ -1,12 +1,13 @@
 """One picture of what restoration does: each catalogue vessel near, farther and far; measured, restored, truth.
 
-    python -m shipshape_lab.experiments.gallery --data runs/data --bundle models --out docs/figures
+    python -m shipshape_lab.experiments.gallery --set P --data runs/data --bundle models --out docs/figures
 
-Clouds of set P by preset `best`, drawn in the true vessel frame, seen from ahead of the beam that the sensor
+Clouds of set P or H by preset `best`, drawn in the true vessel frame, seen from ahead of the beam that the sensor
 does not see: there lies what must be inferred.
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,12 @@ from tqdm import tqdm
 from shipshape.bundle import load_bundle
 from shipshape.pipeline import Pipeline
 from shipshape.types import Contact, Recognition
-from shipshape_lab.experiments.systems import BEST
 from shipshape_lab.metrics import bow_right, heading_error_deg
 from shipshape_lab.training.examples import Example, Examples
 
-DISTANCES = (30, 70, 110)
+DISTANCES = {"P": (30, 70, 110), "H": (40, 100, 160)}
+FILES = {"P": "gallery.png", "H": "gallery_hard.png"}
+SLACK_M = {"P": 1.0, "H": 12.0}
 COLUMNS = ("measured", "restored", "truth")
 HEADING_DEG = 240  # the sensor looks at the starboard bow
 TRUTH_POINTS = 4_000
@@ -31,8 +33,14 @@ AZIMUTH_OFF_BOW_DEG = 50.0
 MEASURED, INFERRED, TRUTH = "#D55E00", "#0072B2", "#555555"
 
 
-def nearest_cluster(examples: Examples, label: int, distance: float) -> int:
-    """The cluster of this vessel and distance whose heading is nearest to HEADING_DEG.
+def nearest_cluster(examples: Examples, label: int, distance: float, slack_m: float) -> int:
+    """The cluster of this vessel at about a distance whose heading is nearest to HEADING_DEG.
+
+    Args:
+        examples: the set.
+        label: number of the vessel in the catalogue.
+        distance: metres.
+        slack_m: how much farther off this distance a cluster may be than the nearest one.
 
     Raises:
         ValueError: the set has no cluster of this vessel.
@@ -42,7 +50,7 @@ def nearest_cluster(examples: Examples, label: int, distance: float) -> int:
     if len(usable) == 0:
         raise ValueError(f"expected clusters of catalogue vessel {label} in the set, got none")
     off = np.abs(clusters.range_m[usable] - distance)
-    usable = usable[off <= off.min() + 1.0]
+    usable = usable[off <= off.min() + slack_m]
     turned = np.cos(clusters.heading[usable] - np.radians(HEADING_DEG))
     return int(usable[np.argmax(turned)])
 
@@ -104,25 +112,25 @@ def _caption(said: Recognition, example: Example) -> str:
     return f"{said.vessel.replace('_', ' ')} {said.probability:.0%}, {error:.1f}° off{bow}"
 
 
-def draw(examples: Examples, pipeline: Pipeline) -> Figure:
+def draw(examples: Examples, pipeline: Pipeline, distances: Sequence[int], slack_m: float) -> Figure:
     """The whole picture: a row a vessel, three panels a distance."""
     names = [vessel.name for vessel in pipeline.bundle.catalogue]
-    columns = len(DISTANCES) * len(COLUMNS)
+    columns = len(distances) * len(COLUMNS)
     figure = Figure(figsize=(16.0, 1.35 * len(names) + 0.3), dpi=90)
     FigureCanvasAgg(figure)
     figure.subplots_adjust(left=0.015, right=0.999, bottom=0.005, top=0.93, wspace=0.03, hspace=0.15)
     grid = figure.subplots(len(names), columns, squeeze=False)
     for label in tqdm(range(len(names)), desc="gallery"):
-        for block, distance in enumerate(DISTANCES):
-            example = examples.example(nearest_cluster(examples, label, distance))
+        for block, distance in enumerate(distances):
+            example = examples.example(nearest_cluster(examples, label, distance, slack_m))
             said = pipeline.run(Contact(example.contact.points_level))
             _draw_row(list(grid[label, 3 * block : 3 * block + 3]), example, said)
-    _write_names(figure, grid, names)
+    heads = [f"{distance} m {column}" for distance in distances for column in COLUMNS]
+    _write_names(figure, grid, names, heads)
     return figure
 
 
-def _write_names(figure: Figure, grid: np.ndarray, names: list[str]) -> None:
-    heads = [f"{distance} m {column}" for distance in DISTANCES for column in COLUMNS]
+def _write_names(figure: Figure, grid: np.ndarray, names: list[str], heads: list[str]) -> None:
     for axes, head in zip(grid[0], heads, strict=True):
         place = axes.get_subplotspec().get_position(figure)
         figure.text((place.x0 + place.x1) / 2, 0.975, head, ha="center", fontsize=9, weight="bold")
@@ -133,20 +141,22 @@ def _write_names(figure: Figure, grid: np.ndarray, names: list[str]) -> None:
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Command line: writes OUT/gallery.png."""
+    """Command line: writes OUT/gallery.png, or gallery_hard.png of H."""
     parser = argparse.ArgumentParser(
         prog="python -m shipshape_lab.experiments.gallery",
         description="Draws measured, restored and true clouds of each catalogue vessel.",
         epilog="example: python -m shipshape_lab.experiments.gallery --data runs/data --out docs/figures",
     )
+    parser.add_argument("--set", choices=tuple(FILES), default="P", help="the test set (default P)")
     parser.add_argument("--data", type=Path, required=True, help="folder of the data sets")
     parser.add_argument("--bundle", type=Path, default=Path("models"), help="model bundle (default models)")
     parser.add_argument("--out", type=Path, default=Path("docs/figures"), help="folder of the picture")
     args = parser.parse_args(argv)
-    figure = draw(Examples.read(args.data, "P"), Pipeline(load_bundle(args.bundle)))
+    examples, pipeline = Examples.read(args.data, args.set), Pipeline(load_bundle(args.bundle))
+    figure = draw(examples, pipeline, DISTANCES[args.set], SLACK_M[args.set])
     args.out.mkdir(parents=True, exist_ok=True)
-    figure.savefig(args.out / "gallery.png", metadata={"Software": None})
-    print(f"wrote {args.out / 'gallery.png'} ({BEST})")
+    figure.savefig(args.out / FILES[args.set], metadata={"Software": None})
+    print(f"wrote {args.out / FILES[args.set]}")
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
-"""The systems that are compared, all run by the service's own stages on the same contact.
+"""The systems that are compared, on the same contacts; those of the pipeline are run by the service's own stages.
 
 `best` is the shipped default; `full_top`, `full_side`, `z_top` and `z_side` are preset `paper` with each of its
-image methods; `raw_spd2` is the classifier of the raw cluster, which the pipeline calls the prior.
+image methods; `raw_spd2` is the classifier of the raw cluster, which the pipeline calls the prior. The peers are
+what a user might take instead, trained on the same clusters: `pointnet`, `pointnet2` and `mirrored_spd2`.
 """
 
 import copy
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from shipshape.pipeline import Pipeline
@@ -15,7 +16,9 @@ from shipshape.work import Work
 
 BEST, RAW = "best", "raw_spd2"
 IMAGE_METHODS = tuple(str(method) for method in ImageMethod)
-SYSTEMS = (RAW, BEST, *IMAGE_METHODS)
+PEERS = ("mirrored_spd2", "pointnet", "pointnet2")
+SYSTEMS = (BEST, RAW, *PEERS, *IMAGE_METHODS)  # in the order of every table
+RIVALS = (RAW, *PEERS)  # that the targets name, apart from the paper's method
 PIPELINES = (BEST, *IMAGE_METHODS)  # those that go through every stage
 PAPER_POSE = str(ImageMethod.FULL_SIDE)  # preset `paper` finds one pose for all of its image methods
 
@@ -47,8 +50,8 @@ class Run:
         return self
 
 
-def run_systems(pipeline: Pipeline, contact: Contact) -> dict[str, Run]:
-    """Every pipeline of PIPELINES on one contact; what systems share is computed once.
+def run_systems(pipeline: Pipeline, contact: Contact, methods: Sequence[str] = IMAGE_METHODS) -> dict[str, Run]:
+    """`best` and preset `paper` with each of `methods` on one contact; what they share is computed once.
 
     Raises:
         InvalidInput: the contact cannot be one vessel's cluster.
@@ -56,7 +59,8 @@ def run_systems(pipeline: Pipeline, contact: Contact) -> dict[str, Run]:
     raw = Run(pipeline.begin(contact, Options())).through(pipeline, _PRIOR)
     rest = [stage.name for stage in pipeline.stages if stage.name not in (*_PRIOR, *_POSE)]
     runs = {BEST: raw.branch(Options(Preset.BEST)).through(pipeline, (*_POSE, *rest))}
-    paper = raw.branch(Options(Preset.PAPER)).through(pipeline, _POSE)
-    for method in ImageMethod:
-        runs[str(method)] = paper.branch(Options(Preset.PAPER, method)).through(pipeline, rest)
+    if methods:
+        paper = raw.branch(Options(Preset.PAPER)).through(pipeline, _POSE)
+        for method in map(ImageMethod, methods):
+            runs[str(method)] = paper.branch(Options(Preset.PAPER, method)).through(pipeline, rest)
     return runs

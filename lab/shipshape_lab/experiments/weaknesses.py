@@ -1,24 +1,31 @@
-"""Known weaknesses, read off the numbers: where `best` does worst, and where something simpler beats it."""
+"""What does not work, read off the numbers: where `best` does worst, and where something simpler beats it."""
 
 from collections.abc import Iterable, Iterator
 
-from shipshape_lab.experiments.numbers import DISTANCES, Numbers, aspect_names
-from shipshape_lab.experiments.systems import BEST, IMAGE_METHODS, RAW
-from shipshape_lab.experiments.targets import TARGETS, as_percent
+from shipshape_lab.experiments.markdown import DISTANCE_SLICES, asked, spoken
+from shipshape_lab.experiments.numbers import BANDS, Numbers, aspect_names
+from shipshape_lab.experiments.systems import BEST
+from shipshape_lab.experiments.targets import MISSED, TARGETS, as_percent
 
-_DISTANCES = tuple(f"{distance}m" for distance in DISTANCES)
-_SLICES = ("overall", "beyond_70m", "bow_on", "stern_on", *_DISTANCES, *aspect_names())
+_ASPECTS = ("bow_on", "stern_on", *aspect_names())
+_BANDS = tuple(f"{low}_{high}m" for low, high in BANDS)
+_SLICES = {
+    "P": ("overall", *DISTANCE_SLICES, *_ASPECTS),
+    "far": ("", *_BANDS, *_ASPECTS),
+    "H": ("", *_BANDS, "occluded", "not_occluded", *_ASPECTS),
+}
+_SURE = 0.02  # said more often than it is right by this much: worth a sentence
 
 
 def weaknesses(numbers: Numbers, catalogue: Iterable[str]) -> list[str]:
-    """Sentences, most important first; never empty, as something is always worst."""
+    """Sentences, most important first; empty only where nothing was measured."""
     return [
         *_unmet(numbers),
-        *_worst(numbers, "accuracy.best.{}", "Accuracy", tuple(catalogue)),
-        *_worst(numbers, "heading.best.within_5deg.{}", "The share of headings within 5 deg", tuple(catalogue)),
-        *_worst(numbers, "bow_stern.best.{}", "Telling bow from stern", tuple(catalogue)),
+        *_worst(numbers, tuple(catalogue)),
         *_beaten(numbers),
         *_restoration(numbers),
+        *_unknown(numbers, tuple(catalogue)),
+        *_spread(numbers),
         *_refusal(numbers),
     ]
 
@@ -26,58 +33,96 @@ def weaknesses(numbers: Numbers, catalogue: Iterable[str]) -> list[str]:
 def _unmet(numbers: Numbers) -> Iterator[str]:
     for target in TARGETS:
         value, verdict = target.verdict(numbers)
-        if verdict != "reached":
-            yield f"Target {verdict.replace('*', '')}: {target.text} ({value}, wanted {target.wanted})."
+        if verdict == MISSED:
+            yield f"Target not reached: {target.text} ({value}, wanted {target.wanted})."
 
 
-def _worst(numbers: Numbers, key: str, what: str, catalogue: tuple[str, ...]) -> Iterator[str]:
-    found = []
-    for kind in (_DISTANCES, aspect_names(), catalogue):
-        values = {name: numbers[f"P.{key.format(name)}"] for name in kind if f"P.{key.format(name)}" in numbers}
-        if values:
-            name = min(values, key=lambda name: values[name])
-            found.append(f"{spoken(name)} ({as_percent(values[name])})")
-    if found:
-        yield f"{what} is lowest at {', '.join(found)}."
+def _worst(numbers: Numbers, catalogue: tuple[str, ...]) -> Iterator[str]:
+    kinds = {
+        "P": (DISTANCE_SLICES, aspect_names(), catalogue),
+        "H": (_BANDS, aspect_names(), ("occluded",), catalogue),
+    }
+    for what, key in (
+        ("P: accuracy", "P.accuracy.best.{}"),
+        ("H: accuracy", "H.error.best.{}"),
+        ("P: the share of headings within 5 deg", "P.heading.best.within_5deg.{}"),
+        ("H: the share of headings within 5 deg", "H.heading.best.within_5deg.{}"),
+        ("H: telling bow from stern", "H.bow_stern.best.{}"),
+    ):
+        found = [text for parts in kinds[key[0]] for text in _lowest(numbers, key, parts)]
+        if found:
+            yield f"{what} is lowest at {', '.join(found)}."
+
+
+def _lowest(numbers: Numbers, key: str, parts: Iterable[str]) -> Iterator[str]:
+    values = {part: numbers[key.format(part)] for part in parts if key.format(part) in numbers}
+    if ".error." in key:
+        values = {part: 1.0 - value for part, value in values.items()}
+    if values and min(values.values()) < 1.0:
+        part = min(values, key=lambda part: values[part])
+        yield f"{spoken(part)} ({as_percent(values[part])})"
 
 
 def _beaten(numbers: Numbers) -> Iterator[str]:
-    for rival in (RAW, *IMAGE_METHODS):
-        ahead = []
-        for part in _SLICES:
-            ours, theirs = (numbers.get(f"P.accuracy.{system}.{part}") for system in (BEST, rival))
-            if ours is not None and theirs is not None and theirs > ours:
-                ahead.append(f"{spoken(part)} ({as_percent(theirs)} against {as_percent(ours)})")
-        if ahead:
-            yield f"`{rival}` classifies better than `best`: {', '.join(ahead)}."
+    for name, parts in _SLICES.items():
+        prefix = "H.error." if name == "H" else f"{name}.accuracy."
+        for rival in asked(numbers, prefix):
+            ahead = []
+            for part in parts:
+                keys = [f"{prefix}{system}{f'.{part}' if part else ''}" for system in (BEST, rival)]
+                if rival == BEST or any(key not in numbers for key in keys):
+                    continue
+                ours, theirs = (1.0 - numbers[key] if name == "H" else numbers[key] for key in keys)
+                if theirs > ours:
+                    ahead.append(f"{spoken(part or 'overall')} ({as_percent(theirs)} against {as_percent(ours)})")
+            if ahead:
+                yield f"{name}: `{rival}` names vessels better than `best`: {', '.join(ahead)}."
 
 
 def _restoration(numbers: Numbers) -> Iterator[str]:
-    for rival in ("raw", "mirrored", "mirrored_true_pose", *IMAGE_METHODS):
-        behind = []
-        for end in ("", *(f".{name}" for name in (*_DISTANCES, *aspect_names(), "bow_on", "stern_on"))):
-            ours, theirs = (numbers.get(f"P.cd_l1.{cloud}{end}") for cloud in (BEST, rival))
-            if ours is not None and theirs is not None and theirs <= ours:
-                behind.append(f"{spoken(end[1:]) if end else 'overall'} ({theirs:.1f} against {ours:.1f})")
-        if behind:
-            yield f"The `{rival}` cloud has a CD-L1 as low as the restored one or lower: {', '.join(behind)}."
+    for name in ("P", "H"):
+        ours = numbers.get(f"{name}.cd_l1.best")
+        rivals = {
+            key.split(".")[2]: value
+            for key, value in numbers.items()
+            if key.startswith(f"{name}.cd_l1.") and key.count(".") == 2
+        }
+        ahead = [
+            f"`{rival}` ({value:.1f} against {ours:.1f})"
+            for rival, value in rivals.items()
+            if ours is not None and rival not in (BEST, "surface") and value <= ours
+        ]
+        if ahead:
+            yield f"{name}: clouds whose CD-L1 is as low as the restored one's or lower: {', '.join(ahead)}."
+
+
+def _unknown(numbers: Numbers, catalogue: tuple[str, ...]) -> Iterator[str]:
+    prefix = "U.called_unknown.best."
+    taken = {key.removeprefix(prefix): 1.0 - value for key, value in numbers.items() if key.startswith(prefix)}
+    worst = sorted(taken.items(), key=lambda item: -item[1])[:3]
+    if worst and worst[0][1] > 0:
+        said = ", ".join(f"{spoken(kind)} ({as_percent(share)})" for kind, share in worst)
+        yield f"U: most often taken for a vessel of the catalogue: {said}."
+    for name in ("P", "far"):
+        share = numbers.get(f"{name}.unknown_share.best", 0.0)
+        if share > 0:
+            yield f"{name}: {as_percent(share)}, all of it in the catalogue, is called unknown."
+    for vessel in catalogue:
+        share = numbers.get(f"H.confusion.best.{vessel}.unknown", 0.0)
+        if share > _SURE:
+            yield f"H: {as_percent(share)} of the {spoken(vessel)}s are called unknown."
+
+
+def _spread(numbers: Numbers) -> Iterator[str]:
+    for name in ("P", "H"):
+        key = f"{name}.heading.best.within_1std"
+        if key in numbers and not 0.6 <= numbers[key] <= 0.8:
+            inside = as_percent(numbers[key])
+            yield f"{name}: {inside} of the headings lie within the said standard deviation; it should be 68 %."
 
 
 def _refusal(numbers: Numbers) -> Iterator[str]:
-    if numbers.get("P.refused"):
-        yield f"{numbers['P.refused']} of {numbers['P.clusters']} clusters are refused and count as wrong."
-    unknown = numbers.get("P.unknown_share.best", 0.0)
-    if unknown > 0:
-        yield f"{as_percent(unknown)} of P, all of it in the catalogue, is called unknown."
-
-
-def spoken(name: str) -> str:
-    """A slice as a reader would say it."""
-    if name.startswith("aspect_"):
-        low, high = name.split("_")[1:]
-        return f"aspect {low}-{high} deg"
-    if name in _DISTANCES:
-        return f"{name[:-1]} m"
-    return {"beyond_70m": "beyond 70 m", "bow_on": "bow-on", "stern_on": "stern-on"}.get(
-        name, name.replace("_", " ")
-    )
+    for name in ("P", "far", "H", "U"):
+        refused, clusters = (numbers.get(f"{name}.{what}", 0) for what in ("refused", "clusters"))
+        if refused:
+            yield f"{name}: {refused} of {clusters} clusters are refused and count as wrong."
