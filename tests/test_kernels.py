@@ -13,6 +13,30 @@ from shipshape import kernels
 
 SEEDS = st.integers(0, 2**32 - 1)
 EDGES = np.array([0.0, 0.2, 0.5, 1.0], np.float32)
+AS_THEY_ARE = ((0, 1, 2), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))  # points that are in pixels and shares already
+
+
+@properties(30)
+@given(SEEDS, st.integers(1, 200), st.floats(-math.pi, math.pi))
+def test_extent_is_that_of_the_turned_points(seed: int, count: int, bearing: float) -> None:
+    points = random_points(count, seed)
+    cos, sin = math.cos(bearing), math.sin(bearing)
+    turned = points.astype(np.float64) @ [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]
+
+    found = kernels.extent(points, bearing)
+
+    np.testing.assert_allclose(found.lower, turned.min(axis=0), atol=1e-5)
+    np.testing.assert_allclose(found.upper, turned.max(axis=0), atol=1e-5)
+    np.testing.assert_allclose(found.mean, turned.mean(axis=0), atol=1e-5)
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_the_mean_tells_of_a_broken_coordinate(broken: float, axis: int) -> None:
+    points = random_points(50, 1)
+    points[17, axis] = broken
+
+    assert not np.isfinite(kernels.extent(points, 0.0).mean).all()
 
 
 @properties(30)
@@ -86,7 +110,7 @@ def test_rasterise_fills_the_cells_that_numpy_fills(seed: int, count: int) -> No
     rng = np.random.default_rng(seed)
     points = rng.uniform((-1, -1, -0.3), (columns + 1, rows + 1, 1.3), (count, 3)).astype(np.float32)
 
-    found = kernels.rasterise(points, EDGES, (rows, columns))
+    found = kernels.rasterise(points, *AS_THEY_ARE, EDGES, (rows, columns))
 
     u, v, depth = points.T
     inside = (u >= 0) & (u < columns) & (v >= 0) & (v < rows)
@@ -109,7 +133,9 @@ def test_rasterise_fills_the_cells_that_numpy_fills(seed: int, count: int) -> No
 
 @pytest.mark.parametrize(("depth", "layer"), [(-5.0, 0), (0.0, 0), (0.2, 1), (0.49, 1), (0.5, 2), (7.0, 2)])
 def test_a_layer_starts_at_its_lower_edge_and_the_outer_ones_are_open(depth: float, layer: int) -> None:
-    count, top, _, _ = kernels.rasterise(np.array([[1.5, 0.5, depth]], np.float32), EDGES, (2, 3))
+    point = np.array([[1.5, 0.5, depth]], np.float32)
+
+    count, top, _, _ = kernels.rasterise(point, *AS_THEY_ARE, EDGES, (2, 3))
 
     assert np.argwhere(count).tolist() == [[layer, 0, 1]]
     assert top[layer, 0, 1] == np.float32(depth)
@@ -122,8 +148,13 @@ def test_spherical_bins_are_those_of_numpy(seed: int, count: int, radius: float)
     centre = random_points(1, seed + 1, spread=0.5)[0]
     points = _off_the_edges(random_points(count, seed), centre, radius, shape)
 
-    found, nearest, farthest = kernels.bin_spherically(points, centre, radius, shape)
+    elsewhere = centre + np.float32(100.0)
+    nothing, (found, nearest, farthest) = (
+        [array[k] for array in kernels.bin_spherically(points, np.stack([elsewhere, centre]), radius, shape)]
+        for k in range(2)
+    )
 
+    assert not any(array.any() for array in nothing)
     stratum, row, column, distance = _spherical(points, centre, radius, shape)
     near = distance < radius
     cell = tuple(np.floor(index[near]).astype(int) for index in (stratum, row, column))
@@ -165,7 +196,7 @@ def _off_the_edges(
 def test_the_centre_is_not_its_own_neighbour() -> None:
     centre = np.array([1.0, 2.0, 3.0], np.float32)
 
-    count, nearest, farthest = kernels.bin_spherically(centre[None], centre, 1.0, (3, 4, 8))
+    count, nearest, farthest = kernels.bin_spherically(centre[None], centre[None], 1.0, (3, 4, 8))
 
     assert not count.any()
     assert not nearest.any()
@@ -186,10 +217,10 @@ def test_the_zenith_is_the_first_row_and_the_bow_the_middle_column(
     direction: tuple[float, float, float], row: int, column: int
 ) -> None:
     count, _, _ = kernels.bin_spherically(
-        np.array([direction], np.float32), np.zeros(3, np.float32), 3.0, (1, 4, 8)
+        np.array([direction], np.float32), np.zeros((1, 3), np.float32), 3.0, (1, 4, 8)
     )
 
-    assert np.argwhere(count).tolist() == [[0, row, column]]
+    assert np.argwhere(count).tolist() == [[0, 0, row, column]]
 
 
 def lift_one(
@@ -199,10 +230,12 @@ def lift_one(
     occupied = np.zeros((1, 3, 4), np.bool_)
     occupied[0, 1, 2] = True
     bounds = np.zeros((4, 1, 3, 4), np.float32)
-    bounds[:, 0, 1, 2] = (top, bottom, *(seen or (-np.inf, np.inf)))
+    bounds[:, 0, 1, 2] = (top, bottom, *(seen or (0.0, 0.0)))
+    count = np.zeros((1, 3, 4), np.int32)
+    count[0, 1, 2] = 5 if seen else 0
     offset = np.zeros((2, 1, 3, 4), np.float32)
     offset[:, 0, 1, 2] = (0.25, -0.125)
-    return kernels.lift_columns(occupied, bounds, offset, step)
+    return kernels.lift_columns(occupied, (bounds[0], bounds[1]), (count, bounds[2], bounds[3]), offset, step)
 
 
 def test_a_flat_cell_is_lifted_to_one_point_at_its_top() -> None:
@@ -235,8 +268,10 @@ def test_a_cell_measured_from_top_to_bottom_gives_nothing() -> None:
 def test_an_empty_image_gives_nothing() -> None:
     nothing = np.zeros((3, 4, 5), np.bool_)
 
+    depth, offset = np.ones((3, 4, 5), np.float32), np.zeros((2, 3, 4, 5), np.float32)
+
     lifted = kernels.lift_columns(
-        nothing, np.ones((4, 3, 4, 5), np.float32), np.zeros((2, 3, 4, 5), np.float32), 0.1
+        nothing, (depth, depth), (np.ones((3, 4, 5), np.int32), depth, depth), offset, 0.1
     )
 
     assert lifted.shape == (0, 3)

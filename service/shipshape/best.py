@@ -57,5 +57,5 @@ class BestMethod:
         restored = classification.mean_confidence(work.images, self._models["spd2"])
         evidence = [work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]
         fused = classification.fuse(evidence, self._parameters["fusion_weights"])
-        measured_along = work.points_vessel[work.restored.measured, 0]
+        measured_along = work.points_vessel[: len(work.contact.points_level), 0]  # they come first
         work.probabilities = classification.rule_out_too_long(fused, float(np.ptp(measured_along)), self._longest)

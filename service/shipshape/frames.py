@@ -28,19 +28,26 @@ def to_vessel(
     points_level: Float32[np.ndarray, "n 3"], heading: float, origin_level: tuple[float, float, float]
 ) -> Float32[np.ndarray, "n 3"]:
     """Level-frame points expressed in the frame with yaw `heading` and its origin at `origin_level`."""
-    centred = points_level - np.asarray(origin_level, dtype=np.float32)
-    centred[:, :2] = centred[:, :2] @ R_level_vessel(heading).astype(np.float32)
-    return centred
+    centred = points_level - np.asarray(
+        origin_level, dtype=np.float32
+    )  # first: far from the origin, digits are few
+    points_vessel: Float32[np.ndarray, "n 3"] = centred @ _about_z(heading)
+    return points_vessel
 
 
 def to_level(
     points_vessel: Float32[np.ndarray, "n 3"], heading: float, origin_level: tuple[float, float, float]
 ) -> Float32[np.ndarray, "n 3"]:
     """The inverse of `to_vessel`."""
-    turned = points_vessel.copy()
-    turned[:, :2] = turned[:, :2] @ R_level_vessel(heading).T.astype(np.float32)
+    turned: Float32[np.ndarray, "n 3"] = points_vessel @ _about_z(heading).T
     turned += np.asarray(origin_level, dtype=np.float32)
     return turned
+
+
+def _about_z(heading: float) -> Float32[np.ndarray, "3 3"]:
+    """Rotation from the vessel frame to the level frame; times a row of points from the right, its inverse."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]], np.float32)
 
 
 def aspect_deg(heading: float, origin_level: tuple[float, float, float]) -> float:

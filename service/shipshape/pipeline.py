@@ -8,7 +8,7 @@ The staged executor takes the steps one by one instead: `begin`, each of `stages
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,6 +82,8 @@ class Pipeline:
         Raises:
             InvalidInput: the contact cannot be one vessel's cluster.
         """
+        # Doors hand in views of received bytes, read-only and strided: kernels would be compiled for each kind.
+        contact = replace(contact, points_level=np.require(contact.points_level, np.float32, ["C", "W"]))
         check_contact(contact, self.limits)
         frame = sight.sight_frame(contact)
         return Work(contact, options, frame, sight.to_sight(contact.points_level, frame))

@@ -48,12 +48,10 @@ class Layers:
 def rasterise(points: Float32[np.ndarray, "n 3"], frame: ImageFrame) -> Layers:
     """The layers of `frame` filled with `points` (metres, the frame that `frame` speaks of)."""
     width, height = frame.pixel
-    column_axis, row_axis, depth_axis = frame.axes
-    pixels = np.empty((len(points), 3), np.float32)
-    pixels[:, 0] = (points[:, column_axis] - frame.lower[0]) / width
-    pixels[:, 1] = (frame.upper[1] - points[:, row_axis]) / height
-    pixels[:, 2] = (points[:, depth_axis] - frame.lower[2]) / frame.depth_range
-    return Layers(*kernels.rasterise(pixels, np.asarray(frame.edges, np.float32), frame.shape))
+    start = (frame.lower[0], frame.upper[1], frame.lower[2])
+    unit = (width, -height, frame.depth_range)
+    edges = np.asarray(frame.edges, np.float32)
+    return Layers(*kernels.rasterise(points, frame.axes, start, unit, edges, frame.shape))
 
 
 def to_metres(
@@ -92,8 +90,7 @@ def aligned_frame(length: float) -> ImageFrame:
 
 def to_planes(layers: Layers) -> Float32[np.ndarray, "planes rows columns"]:
     """What a network sees of the layers: occupancy (0 or 1), top and bottom of each layer."""
-    occupied = (layers.count > 0).astype(np.float32)
-    return np.concatenate([occupied, np.clip(layers.top, 0, 1), np.clip(layers.bottom, 0, 1)])
+    return kernels.stack_planes(layers.count, layers.top, layers.bottom)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +109,7 @@ def to_grey(
     frame: ImageFrame,
 ) -> UInt8[np.ndarray, "rows columns 3"]:
     """B G R picture of lower, middle and upper layer: 1..255 from bottom to top of each layer, 0 where empty."""
-    edges = np.asarray(frame.edges, np.float32)[:, None, None]
-    share = np.clip((depth - edges[:-1]) / (edges[1:] - edges[:-1]), 0.0, 1.0)
-    grey = np.where(occupied, 1 + np.rint(254 * share), 0).astype(np.uint8)
-    return np.ascontiguousarray(grey.transpose(1, 2, 0))
+    return kernels.grey_levels(occupied, depth, np.asarray(frame.edges, np.float32))
 
 
 def from_grey(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32
 
-from shipshape import frames
+from shipshape import frames, kernels
 from shipshape.types import Contact
 
 
@@ -30,12 +30,11 @@ class SightFrame:
 
 def sight_frame(contact: Contact) -> SightFrame:
     """The sight frame of a contact's cluster."""
-    points = contact.points_level
-    middle = points[:, :2].mean(axis=0, dtype=np.float64)
-    bearing = math.atan2(middle[1], middle[0])
-    across = points[:, :2] @ frames.R_level_vessel(bearing).astype(np.float32)
-    middle = frames.R_level_vessel(bearing) @ (across.min(axis=0) + across.max(axis=0)) / 2
-    water = float(points[:, 2].min()) if contact.sensor_height is None else -contact.sensor_height
+    mean = kernels.extent(contact.points_level, 0.0).mean
+    bearing = math.atan2(mean[1], mean[0])
+    lower, upper, _ = kernels.extent(contact.points_level, bearing)
+    middle = frames.R_level_vessel(bearing) @ (lower[:2] + upper[:2]) / 2
+    water = float(lower[2]) if contact.sensor_height is None else -contact.sensor_height
     origin = (float(middle[0]), float(middle[1]), water)
     return SightFrame(bearing, origin, contact.sensor_height is not None)
 

@@ -1,11 +1,13 @@
 """Is this one vessel's cluster? Checked once, at the edge of the pipeline."""
 
+import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from jaxtyping import Float32
 
+from shipshape import kernels
 from shipshape.errors import InvalidInput, TooLarge, Unprocessable
 from shipshape.types import Contact
 
@@ -43,18 +45,19 @@ def check_contact(contact: Contact, limits: ContactLimits) -> None:
         )
     if len(points) < limits.min_points:
         raise Unprocessable(f"expected at least {limits.min_points} points in a cluster, got {len(points)}")
-    broken = int(np.count_nonzero(~np.isfinite(points).all(axis=1)))
-    if broken:
+    extent = kernels.extent(points, 0.0)
+    if not np.isfinite(extent.mean).all():
+        broken = int(np.count_nonzero(~np.isfinite(points).all(axis=1)))
         raise Unprocessable(f"expected finite coordinates, got {broken} points with NaN or infinity")
-    _check_numbers(contact)
-    _check_extent(points, limits)
+    _check_numbers(contact, float(extent.upper[2]))
+    if not _box_is_enough(extent, limits):
+        _check_hull(points, limits)
 
 
-def _check_numbers(contact: Contact) -> None:
+def _check_numbers(contact: Contact, top: float) -> None:
     height = contact.sensor_height
     if height is not None and not 0.0 < height < 200.0:
         raise Unprocessable(f"expected a sensor height between 0 and 200 m above the water, got {height}")
-    top = float(contact.points_level[:, 2].max())
     if height is not None and top < -height:
         raise Unprocessable(
             f"expected points above the water, which is at z = {-height:g} m, "
@@ -65,7 +68,21 @@ def _check_numbers(contact: Contact) -> None:
         raise Unprocessable(f"expected the own true heading in degrees, got {own}")
 
 
-def _check_extent(points: Float32[np.ndarray, "n 3"], limits: ContactLimits) -> None:
+def _box_is_enough(extent: kernels.Extent, limits: ContactLimits) -> bool:
+    """Whether the box along x, y and z already shows what `_check_hull` asks; it does of nearly every cluster."""
+    (left, near, low), (right, far, high) = extent.lower.tolist(), extent.upper.tolist()
+    across = math.hypot(right - left, far - near)  # no two points are farther apart
+    nearest = math.hypot(max(left, -right, 0.0), max(near, -far, 0.0))
+    farthest = math.hypot(max(-left, right), max(-near, far))
+    return (
+        max(across, high - low) <= limits.max_extent
+        and max(right - left, far - near) >= limits.min_extent
+        and nearest >= _TOUCHING
+        and farthest <= limits.max_range
+    )
+
+
+def _check_hull(points: Float32[np.ndarray, "n 3"], limits: ContactLimits) -> None:
     hull = cv2.convexHull(
         np.ascontiguousarray(points[:, :2])
     )  # unlike a box along x and y, it turns with the world

@@ -54,10 +54,8 @@ def inpaint_layers(
     planes, features = network_inputs(layers, pose, points)
     occupancy, top, bottom, offset, classes = model.run(planes=planes[None], features=features[None])
     measured = layers.count > 0
-    filled = FilledLayers(
-        occupied=measured | (occupancy[0] > 0.5),
-        top=np.where(measured, np.maximum(top[0], layers.top), top[0]),
-        bottom=np.where(measured, np.minimum(bottom[0], layers.bottom), bottom[0]),
-        offset=np.where(measured, layers.offset, offset[0]),
-    )
-    return filled, classes[0]
+    # In place: the network's outputs are fresh arrays of ours.
+    np.maximum(top[0], layers.top, out=top[0], where=measured)
+    np.minimum(bottom[0], layers.bottom, out=bottom[0], where=measured)
+    np.copyto(offset[0], layers.offset, where=measured)
+    return FilledLayers(measured | (occupancy[0] > 0.5), top[0], bottom[0], offset[0]), classes[0]

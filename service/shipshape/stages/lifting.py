@@ -37,18 +37,9 @@ def lift_layers(
         pose: the pose of the image.
         frame: its pixel-to-metre transform.
     """
-    measured = layers.count > 0
-    nothing_seen: tuple[np.float32, np.float32] = (np.float32(-np.inf), np.float32(np.inf))
-    bounds = np.stack(
-        [
-            filled.top,
-            filled.bottom,
-            np.where(measured, layers.top, nothing_seen[0]),
-            np.where(measured, layers.bottom, nothing_seen[1]),
-        ]
-    ).astype(np.float32)
+    surface, seen = (filled.top, filled.bottom), (layers.count, layers.top, layers.bottom)
     step = frame.pixel[0] / frame.depth_range
-    lifted = kernels.lift_columns(filled.occupied, bounds, filled.offset, step)
+    lifted = kernels.lift_columns(filled.occupied, surface, seen, filled.offset, step)
     inferred = raster.to_metres(lifted[:, 0], lifted[:, 1], lifted[:, 2], frame)
     inferred_level = pose.to_level(inferred)
     flags: Bool[np.ndarray, " m"] = np.zeros(len(points_level) + len(inferred), np.bool_)

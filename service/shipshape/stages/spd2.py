@@ -22,10 +22,9 @@ def describe(
     points: Float32[np.ndarray, "n 3"], keypoints: Float32[np.ndarray, "k 3"], radius: float
 ) -> Float32[np.ndarray, "k 5 16 32"]:
     """One SPD2 image for each keypoint; points and keypoints in the same frame, `radius` R in metres."""
+    count, nearest, farthest = kernels.bin_spherically(points, keypoints, radius, (STRATA, ROWS, COLUMNS))
     images = np.empty((len(keypoints), CHANNELS, ROWS, COLUMNS), np.float32)
-    for image, keypoint in zip(images, keypoints, strict=True):
-        count, nearest, farthest = kernels.bin_spherically(points, keypoint, radius, (STRATA, ROWS, COLUMNS))
-        image[:STRATA] = 1.0 - np.exp(-0.5 * count)
-        image[STRATA] = np.where(farthest > 0, 1.0 - nearest / radius, 0.0)
-        image[STRATA + 1] = (farthest - nearest) / radius
+    images[:, :STRATA] = 1 - np.exp(np.multiply(count, -0.5, dtype=np.float32))
+    images[:, STRATA] = np.where(farthest > 0, 1 - nearest / radius, 0)
+    images[:, STRATA + 1] = (farthest - nearest) / radius
     return images
