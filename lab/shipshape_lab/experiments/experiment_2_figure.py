@@ -10,7 +10,10 @@ from matplotlib.figure import Figure
 from shipshape_lab.experiments.numbers import DISTANCES, Numbers, aspect_names
 
 NAME = "experiment_2.png"
-_ROWS = {"complete": "trained on complete clouds (3.3.2)", "restored": "trained on restored clouds (4.1.2)"}
+_ROWS = {
+    "complete": "trained on complete clouds (3.3.2)",
+    "restored": "trained on restored clouds (4.1.2), raw_spd2 on raw ones",
+}
 # Okabe and Ito's colours, as in the other figures.
 _COLOURS = {
     "raw_spd2": "#000000",
