@@ -115,14 +115,15 @@ def test_auroc_is_the_area_under_the_curve():
 
 def test_hulls_of_a_catalogue_type_have_no_part_in_the_auroc_of_unknown():
     known = truth_of([0, 1], [50, 60]), answers_of([[0.9, 0, 0.1], [0, 0.7, 0.3]])
-    kinds = np.array(["buoy", "quay", "oc_tugboat"])
+    kinds = np.array(["buoy", "vrx_wamv", "oc_tugboat"])
     outside = truth_of([2, 2, 2], [50, 60, 70], kind=kinds)
     said = answers_of([[0.1, 0.1, 0.8], [0.5, 0.3, 0.2], [0.1, 0.9, 0.0]])
     found = rejection.of_answers((outside, said), known)
     assert found["U.clusters"] == 2
     assert found["U.auroc.best"] == pytest.approx(3 / 4)
-    assert found["U.auroc.best.buoy"] == 1.0
-    assert found["U.called_unknown.best.quay"] == 0.0
+    assert found["U.auroc.best.buoy"] == found["U.auroc.best.generated"] == 1.0
+    assert found["U.auroc.best.real"] == 0.5
+    assert found["U.called_unknown.best.vrx_wamv"] == 0.0
     assert found["U.kin.best.oc_tugboat.called_its_type"] == 1.0
     assert "U.auroc.best.oc_tugboat" not in found
     with pytest.raises(ValueError, match="expected best to have answered P as new too, got bundle"):

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from shipshape_lab.experiments.markdown import DISTANCE_SLICES, asked, spoken
 from shipshape_lab.experiments.numbers import BANDS, Numbers, aspect_names
+from shipshape_lab.experiments.rejection import GROUPS
 from shipshape_lab.experiments.systems import BEST
 from shipshape_lab.experiments.targets import MISSED, TARGETS, as_percent
 
@@ -99,7 +100,7 @@ def _restoration(numbers: Numbers) -> Iterator[str]:
 def _unknown(numbers: Numbers, catalogue: tuple[str, ...]) -> Iterator[str]:
     prefix = "U.called_unknown.best."
     taken = {key.removeprefix(prefix): 1.0 - value for key, value in numbers.items() if key.startswith(prefix)}
-    worst = sorted(taken.items(), key=lambda item: -item[1])[:3]
+    worst = sorted((item for item in taken.items() if item[0] not in GROUPS), key=lambda item: -item[1])[:3]
     if worst and worst[0][1] > 0:
         said = ", ".join(f"{spoken(kind)} ({as_percent(share)})" for kind, share in worst)
         yield f"U: most often taken for a vessel of the catalogue: {said}."
