@@ -26,6 +26,7 @@ ORDER = (
     "recognition_far",
     "recognition_h",
     "recognition_u",
+    "reasons",
     "heading_peers",
     "restoration_p",
     "restoration_h",
