@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from shipshape.bundle import load_bundle
+from shipshape.bundle import UNKNOWN, load_bundle
 from shipshape.pipeline import Pipeline
 from shipshape.types import Contact, Recognition
 from shipshape_lab.metrics import bow_right, heading_error_deg
@@ -96,7 +96,8 @@ def _draw_row(row: list[Axes], example: Example, said: Recognition) -> None:
         axes.set(xlim=(middle[0] - width, middle[0] + width), ylim=(middle[1] - height, middle[1] + height))
         axes.set_aspect("equal", adjustable="box")
         axes.set_axis_off()
-    row[0].set_title(f"{len(example.contact.points_level)} points", fontsize=7, pad=2)
+    range_m = np.hypot(*example.pose.origin_level[:2])
+    row[0].set_title(f"{len(example.contact.points_level)} points, {range_m:.0f} m", fontsize=7, pad=2)
     row[1].set_title(_caption(said, example), fontsize=7, pad=2)
 
 
@@ -109,7 +110,10 @@ def _hidden_side(example: Example) -> float:
 def _caption(said: Recognition, example: Example) -> str:
     error = float(heading_error_deg(np.array(said.heading), np.array(example.pose.heading)))
     bow = "" if bow_right(np.array(said.heading), np.array(example.pose.heading)) else ", bow wrong"
-    return f"{said.vessel.replace('_', ' ')} {said.probability:.0%}, {error:.1f}° off{bow}"
+    name, probability = said.vessel.replace("_", " "), said.probability
+    if said.unknown:
+        name, probability = UNKNOWN, said.probabilities[UNKNOWN]
+    return f"{name} {probability:.0%}, {error:.1f}° off{bow}"
 
 
 def draw(examples: Examples, pipeline: Pipeline, distances: Sequence[int], slack_m: float) -> Figure:
