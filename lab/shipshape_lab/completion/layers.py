@@ -69,14 +69,19 @@ def neighbours(of: Tensor, among: Tensor, count: int) -> Tensor:
 @torch.no_grad()
 def farthest(cloud: Tensor, count: int) -> Tensor:
     """Indices (batch, count) of points chosen one by one, each the farthest from those before; the first is 0."""
-    batch, points, _ = cloud.shape
-    rows = torch.arange(batch, device=cloud.device)
-    chosen = torch.zeros(batch, count, dtype=torch.long, device=cloud.device)
-    gap = torch.full((batch, points), float("inf"), device=cloud.device)
-    for i in range(1, count):
-        last = cloud[rows, chosen[:, i - 1]].unsqueeze(1)
-        gap = torch.minimum(gap, (cloud - last).square().sum(-1))
-        chosen[:, i] = gap.argmax(-1)
+    return _farthest(cloud, count)
+
+
+@torch.jit.script_if_tracing  # a loop in ONNX as well, where tracing alone would write every turn of it out
+def _farthest(cloud: Tensor, count: int) -> Tensor:
+    last = torch.zeros(cloud.shape[0], 1, dtype=torch.long, device=cloud.device)
+    gap = (cloud - cloud[:, :1]).square().sum(-1)
+    chosen = last
+    for _ in range(1, count):
+        last = gap.argmax(-1, keepdim=True)
+        point = cloud.gather(1, last.unsqueeze(-1).expand(-1, -1, 3))
+        gap = torch.minimum(gap, (cloud - point).square().sum(-1))
+        chosen = torch.cat([chosen, last], 1)
     return chosen
 
 
