@@ -28,7 +28,8 @@ losses, trained about five minutes on one core.
 CD-L1 = (mean_P d + mean_G d) / 2 and CD-L2 = mean_P d^2 + mean_G d^2, both x 1000; F-score@1% = harmonic mean of
 the shares with d < 0.01; scaled so that the complete shape's largest extent is 1. G are the 10,000 points of the
 complete shape, and what a mask leaves (`raw`) is a part of them, so `raw` has no wrong point, only missing ones.
-The floor is the complete shape to an image and back, nothing inpainted: no network of that method gets below it.
+The floor is the complete shape to an image and back, nothing inpainted: what a perfect network would leave. `best`
+keeps the points that it was given, so it can come in under its floor.
 
 {_overall(numbers)}
 
@@ -105,7 +106,7 @@ def _verdict(numbers: Numbers) -> str:
 The paper's text gives no figures for this experiment, only an order of its methods: {_order(_PAPER)}. Here it is
 {_order(by_distance)} by CD-L1 and {_order(by_score)} by F-score. Of the {len(cells)} pairs of mask and loss,
 `best` has a lower CD-L1 than all four in {lead}. Lower than the masked cloud itself: {wins}. Where points are lost
-at random the masked cloud still covers the shape, and no image of 64 x 64 cells can improve on it."""
+at random the masked cloud still covers the whole shape, and a picture of 64 x 64 cells is coarser than that."""
 
 
 def _order(names: tuple[str, ...] | list[str]) -> str:
