@@ -16,9 +16,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
 
-from shipshape import frames
+from shipshape import frames, kernels
 from shipshape.types import Reason, RestoredCloud
 from shipshape.work import Work
 
@@ -44,7 +43,7 @@ def measure(work: Work) -> Measures:
     )
 
 
-def reasons_of(found: Measures, *, unknown: bool, thresholds: Mapping[str, float]) -> tuple[Reason, ...]:
+def reasons_of(found: Measures, *, unknown: bool, thresholds: Mapping[str, int | float]) -> tuple[Reason, ...]:
     """The reasons that hold, in the order of `Reason`."""
     holds = {
         Reason.FEW_POINTS: found.points < thresholds.get("few_points", 0),
@@ -59,6 +58,7 @@ def reasons_of(found: Measures, *, unknown: bool, thresholds: Mapping[str, float
 # Wide enough that an empty column means something; these three were compared by ROC on the validation set.
 _POINTS_A_COLUMN = 6
 _FEWEST_COLUMNS, _MOST_COLUMNS = 4, 24
+_LEAST_HEIGHT = np.float32(0.01)  # m, of a column that holds anything
 
 
 def missing_share(restored: RestoredCloud, bearing: float, waterline: float) -> float:
@@ -73,23 +73,11 @@ def missing_share(restored: RestoredCloud, bearing: float, waterline: float) -> 
         bearing: of the line of sight, radians counter-clockwise from +x of the level frame.
         waterline: z of the water in the level frame, m.
     """
-    if not restored.measured.any():  # preset paper: the whole cluster may lie outside its image
+    count = int(np.clip(np.count_nonzero(restored.measured) // _POINTS_A_COLUMN, _FEWEST_COLUMNS, _MOST_COLUMNS))
+    top, measured = kernels.silhouette(restored.points_level, restored.measured, bearing, count)
+    if not measured.any():  # preset paper: the whole cluster may lie outside its image
         return 1.0
-    column, count = _columns(restored, bearing)
-    above = np.maximum(restored.points_level[:, 2] - np.float32(waterline), np.float32(0.01))
-    height = np.zeros(count, np.float32)
-    np.maximum.at(height, column, above)
-    measured = np.bincount(column[restored.measured], minlength=count)
-    density = measured / np.maximum(height, np.float32(0.01))
+    height = np.where(np.isfinite(top), np.maximum(top - np.float32(waterline), _LEAST_HEIGHT), 0.0)
+    density = measured / np.maximum(height, _LEAST_HEIGHT)
     lack = np.maximum(1.0 - density / np.median(density[measured > 0]), 0.0)
     return float((lack * height).sum() / height.sum())
-
-
-def _columns(restored: RestoredCloud, bearing: float) -> tuple[Int[np.ndarray, " m"], int]:
-    """Number of the column of each point, and how many columns there are."""
-    sight = restored.points_level[:, :2] @ frames.R_level_vessel(bearing).astype(np.float32)
-    angle = np.arctan2(sight[:, 1], sight[:, 0])
-    count = int(np.clip(np.count_nonzero(restored.measured) // _POINTS_A_COLUMN, _FEWEST_COLUMNS, _MOST_COLUMNS))
-    right, left = angle.min(), angle.max()
-    share = (angle - right) / max(left - right, np.float32(1e-6))
-    return np.minimum((share * count).astype(np.intp), count - 1), count

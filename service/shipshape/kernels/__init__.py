@@ -7,6 +7,7 @@ it before the service is ready. Arrays are contiguous: a strided one would be co
 from shipshape.kernels.clouds import Extent, extent
 from shipshape.kernels.images import grey_levels, lift_columns, rasterise, stack_planes
 from shipshape.kernels.neighbours import count_neighbours, select_spread
+from shipshape.kernels.silhouette import silhouette
 from shipshape.kernels.sphere import bin_spherically
 
 __all__ = [
@@ -18,5 +19,6 @@ __all__ = [
     "lift_columns",
     "rasterise",
     "select_spread",
+    "silhouette",
     "stack_planes",
 ]
