@@ -8,7 +8,6 @@ total tells how much of it other programs took. Writes OUT/pipeline_ms.json.
 """
 
 import argparse
-import json
 import os
 import platform
 import sys
@@ -22,6 +21,7 @@ from tqdm import tqdm
 from shipshape.bundle import load_bundle
 from shipshape.pipeline import Pipeline
 from shipshape.types import Contact
+from shipshape_lab.experiments import numbers, outcome
 from shipshape_lab.simulator.datasets import hull
 from shipshape_lab.simulator.recipes import TEST_HULLS
 from shipshape_lab.simulator.scan import scan_vessel
@@ -127,9 +127,7 @@ def main(argv: list[str] | None = None) -> None:
         "runs": args.runs,
         "seed": args.seed,
     }
-    args.out.mkdir(parents=True, exist_ok=True)
-    content = json.dumps({**about, "points": measured}, indent=2, sort_keys=True)
-    (args.out / "pipeline_ms.json").write_text(content + "\n")
+    outcome.write(args.out, "pipeline_ms", numbers.of_pipeline_ms(measured), **about)
     print(table(measured))
 
 

@@ -231,6 +231,6 @@ def test_the_benchmark_times_every_stage_of_clusters_of_exactly_that_size(benchm
     assert list(measured["stages"]) == [stage.name for stage in pipeline.stages]
     medians = [times["median"] for times in measured["stages"].values()]
     assert 0 < max(medians) < measured["total"]["median"]
-    found = numbers.of_pipeline_ms({"points": {"100": measured}})
+    found = numbers.of_pipeline_ms({"100": measured})
     assert found["pipeline_ms.best.100"] == measured["total"]["median"]
     assert "keypoints" in benchmark.table({"100": measured})

@@ -132,7 +132,7 @@ def _pose(truth: Truth, said: Said, masks: Masks) -> Iterator[tuple[str, float]]
 def of_pipeline_ms(measured: dict) -> Numbers:
     """Median and 95th percentile of the whole pipeline, and the median of each stage, by points of the cluster."""
     found: Numbers = {}
-    for points, timing in measured["points"].items():
+    for points, timing in measured.items():
         found[f"pipeline_ms.best.{points}"] = timing["total"]["median"]
         found[f"pipeline_ms.best.{points}.p95"] = timing["total"]["p95"]
         found[f"pipeline_ms.best.{points}.processor"] = timing["processor"]["median"]

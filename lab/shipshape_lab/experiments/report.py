@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from shipshape_lab.experiments import figures, numbers, pages
+from shipshape_lab.experiments import figures, pages
 from shipshape_lab.experiments.markdown import table
 from shipshape_lab.experiments.numbers import Numbers
 from shipshape_lab.experiments.targets import TARGETS, bins_below
@@ -65,15 +65,9 @@ def collect(results: Path) -> list[Outcome]:
 
 def _read(path: Path) -> Outcome:
     content = json.loads(path.read_text())
-    if path.stem == "pipeline_ms":  # the benchmark is older than the other experiments' form
-        return Outcome(path.stem, numbers.rounded(numbers.of_pipeline_ms(content)), _about_timing(content))
     if set(content) != {"about", "numbers"}:
         raise ValueError(f"expected {path} to hold about and numbers, got {', '.join(sorted(content))}")
     return Outcome(path.stem, content["numbers"], content["about"])
-
-
-def _about_timing(content: dict) -> dict:
-    return {key: value for key, value in content.items() if key != "points"}
 
 
 def _check_bundle(found: list[Outcome]) -> None:
