@@ -32,8 +32,8 @@ PARAMETERS: Mapping[str, Any] = {
     "best": {
         "looks": 2,
         "heading_std_scale": 1.0,
-        "bow_temperature": 1.0,
-        "fusion_weights": [0.4, 0.3, 0.2, 0.1],
+        "bow_weights": [0.5, 0.5],
+        "fusion_weights": [0.4, 0.3, 0.1, 0.1, 0.1],
     },
 }
 
@@ -41,7 +41,7 @@ PARAMETERS: Mapping[str, Any] = {
 class _Graph:
     """Collects the nodes of a network; every method returns the name of what it computes."""
 
-    def __init__(self, seed: int, **inputs: tuple[int, ...]) -> None:
+    def __init__(self, seed: int, **inputs: tuple[int | str, ...]) -> None:
         self._rng = np.random.default_rng(seed)
         self._inputs = [
             helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *shape])
@@ -115,6 +115,16 @@ def aligned_network() -> OnnxModel:
     )
 
 
+def points_network() -> OnnxModel:
+    """Aligned points -> a bow that points the opposite way, logits."""
+    graph = _Graph(14, points=(6, 1, "points"), features=(5,))
+    seen = graph.node("Concat", graph.pooled("points"), "features", axis=1)
+    return graph.model(
+        flip=graph.linear(seen, 11, (2.0,), 0.5),
+        classes=graph.linear(seen, 11, (0.0, 2.0, 0.0, 0.0), 0.5),
+    )
+
+
 def inpainting_network() -> OnnxModel:
     """Aligned planes and their mirror -> occupancy, top, bottom, offset, class logits."""
     graph = _Graph(13, planes=(18, 32, 64), features=(3,))
@@ -144,6 +154,7 @@ def untrained_bundle() -> Bundle:
         "parts": spd2_network(3, 2),
         "sight": sight_network(),
         "aligned": aligned_network(),
+        "points": points_network(),
         "inpainting": inpainting_network(),
         "spd2": spd2_network(CLASSES, 3),
     }

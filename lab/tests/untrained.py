@@ -25,8 +25,8 @@ PARAMETERS = {
     "best": {
         "looks": 2,
         "heading_std_scale": 1.0,
-        "bow_temperature": 1.0,
-        "fusion_weights": [1.0, 1.0, 1.0, 1.0],
+        "bow_weights": [0.5, 0.5],
+        "fusion_weights": [1.0, 1.0, 1.0, 1.0, 1.0],
     },
 }
 
@@ -77,6 +77,7 @@ def _networks() -> dict:
         "parts": (SPD2, parts),
         "sight": ({"planes": (3, 64, 64), "features": (4,)}, sight),
         "aligned": (LOOK, aligned),
+        "points": ({"points": (6, 1, "points"), "features": (5,)}, {"flip": np.zeros(1), "classes": logits}),
         "inpainting": ({"planes": (18, 32, 64), "features": (3,)}, inpainting),
     }
     for method in ImageMethod:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from shipshape import raster
+from shipshape.alignment import look_at_points
 from shipshape.bundle import Bundle
 from shipshape.softmax import softmax
 from shipshape.stages import bow_stern, classification, heading, inpainting, lifting, projection
@@ -28,9 +29,10 @@ class BestMethod:
         work.heading_std = self._parameters["heading_std_scale"] * work.look.heading_std**power
 
     def bow_stern(self, work: Work) -> None:
-        """The last aligned look also saw the bow."""
-        work.pose, work.bow_probability = bow_stern.by_network(
-            work.look, temperature=self._parameters["bow_temperature"]
+        """The aligned looks saw the bow, and the points themselves show it too."""
+        work.points_look = look_at_points(work.contact.points_level, work.look.pose, self._models["points"])
+        work.pose, work.bow_probability = bow_stern.by_networks(
+            work.look, work.points_look, weights=self._parameters["bow_weights"]
         )
 
     def projection(self, work: Work) -> None:
@@ -53,9 +55,10 @@ class BestMethod:
         )
 
     def classification(self, work: Work) -> None:
-        """Prior, aligned look, bottleneck and restored cloud, weighted as validation says."""
+        """Prior, aligned looks, aligned points, bottleneck and restored cloud, weighted as validation says."""
         restored = classification.mean_confidence(work.images, self._models["spd2"])
-        evidence = [work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]
+        looks = (work.look.class_logits, work.points_look.class_logits, work.bottleneck)
+        evidence = [work.prior, *map(softmax, looks), restored]
         fused = classification.fuse(evidence, self._parameters["fusion_weights"])
         measured_along = work.points_vessel[: len(work.contact.points_level), 0]  # they come first
         work.probabilities = classification.rule_out_too_long(fused, float(np.ptp(measured_along)), self._longest)

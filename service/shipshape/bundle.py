@@ -83,7 +83,7 @@ def check_fit(bundle: Bundle) -> None:
     except ValidationError as error:
         raise BundleError(_first_complaint(error, "parameters")) from error
     known = len(bundle.catalogue)
-    classes = dict.fromkeys(("prior", "aligned", "inpainting", "spd2"), known + 1)  # and "unknown"
+    classes = dict.fromkeys(("prior", "aligned", "points", "inpainting", "spd2"), known + 1)  # and "unknown"
     classes |= {f"spd2_{method}": known for method in ImageMethod}
     for name in classes.keys() & bundle.models.keys():
         last = bundle.models[name].signature.outputs[-1].shape[-1:]
@@ -164,10 +164,10 @@ class _Best(_StageTable):
     looks: Annotated[int, Field(ge=1, le=10)]
     heading_std_scale: _Positive
     heading_std_power: _Positive = 1.0
-    bow_temperature: _Positive
+    bow_weights: Annotated[list[_Finite], Field(min_length=2, max_length=2)]  # look, points
     fusion_weights: Annotated[
-        list[_Finite], Field(min_length=4, max_length=4)
-    ]  # prior, look, bottleneck, restored
+        list[_Finite], Field(min_length=5, max_length=5)
+    ]  # prior, look, points, bottleneck, restored
 
 
 class _Reasons(_StageTable):

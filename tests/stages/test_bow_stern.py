@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import ANGLES, BOAT, FakeModel, constant, heading_error_deg, properties
-from shipshape.alignment import Look
+from shipshape.alignment import Look, PointsLook
 from shipshape.stages import bow_stern
 from shipshape.types import Pose
 
@@ -79,14 +79,18 @@ def test_the_probability_is_that_of_the_way_chosen(along: list[float], seed: int
         assert heading_error_deg(pose.heading, other.heading) < 1e-6
 
 
-@pytest.mark.parametrize(("flip_logit", "flipped"), [(-3.0, False), (3.0, True), (0.0, False)])
-def test_the_network_says_whether_to_turn_round(flip_logit: float, flipped: bool) -> None:
-    seen = Look(POSE, 0.1, flip_logit, np.zeros(4, np.float32))
-
-    pose, probability = bow_stern.by_network(seen, temperature=2.0)
+@pytest.mark.parametrize(
+    ("image", "points", "flipped"), [(-3.0, 0.0, False), (3.0, 0.0, True), (0.0, 0.0, False), (3.0, -9.0, False)]
+)
+def test_the_looks_say_together_whether_to_turn_round(image: float, points: float, flipped: bool) -> None:
+    pose, probability = bow_stern.by_networks(*looks(POSE, image, points), weights=[0.5, 0.25])
 
     assert heading_error_deg(pose.heading, POSE.heading + math.pi * flipped) < 1e-6
-    assert probability == pytest.approx(1 / (1 + math.exp(-abs(flip_logit) / 2.0)))
+    assert probability == pytest.approx(1 / (1 + math.exp(-abs(0.5 * image + 0.25 * points))))
+
+
+def looks(pose: Pose, image: float, points: float) -> tuple[Look, PointsLook]:
+    return Look(pose, 0.1, image, np.zeros(4, np.float32)), PointsLook(points, np.zeros(4, np.float32))
 
 
 @properties()
@@ -94,9 +98,7 @@ def test_the_network_says_whether_to_turn_round(flip_logit: float, flipped: bool
 def test_never_an_average_of_both_ways(yaw: float, flip_logit: float) -> None:
     start = Pose(yaw, POSE.origin_level, BOAT)
 
-    pose, probability = bow_stern.by_network(
-        Look(start, 0.1, flip_logit, np.zeros(4, np.float32)), temperature=1.0
-    )
+    pose, probability = bow_stern.by_networks(*looks(start, flip_logit, flip_logit), weights=[0.5, 0.5])
 
     error = heading_error_deg(pose.heading, yaw)
     assert min(error, 180.0 - error) < 1e-6

@@ -14,7 +14,6 @@ from builders import (
     FakeModel,
     axis_error_deg,
     constant,
-    heading_error_deg,
     noisy,
     place,
     properties,
@@ -22,6 +21,7 @@ from builders import (
     turn_level,
     whole_hull,
 )
+from shipshape import frames
 from shipshape.alignment import look
 from shipshape.sight import SightFrame
 from shipshape.stages import heading
@@ -194,7 +194,7 @@ def test_looks_follow_one_another() -> None:
     poses = [guess]
 
     def halve(**_: np.ndarray) -> list[np.ndarray]:
-        turn = (true.heading - poses[-1].heading) / 2
+        turn = frames.wrap_half_turn(true.heading - poses[-1].heading) / 2
         poses.append(poses[-1].turned(turn))
         same = np.log([[1.0, BOAT.beam / BOAT.length, BOAT.height / BOAT.length]])
         answers = [[[turn, -3.0]], [[0.0]], [[0.0, 0.0, 0.0]], same, [[0.0, 0.0]]]
@@ -203,7 +203,23 @@ def test_looks_follow_one_another() -> None:
     found = heading.by_network(points, guess, FakeModel(halve), looks=4)
 
     assert len(poses) == 5
-    assert heading_error_deg(found.pose.heading, true.heading) == pytest.approx(math.degrees(0.4) / 2**4, abs=0.01)
+    assert axis_error_deg(found.pose.heading, true.heading) == pytest.approx(math.degrees(0.4) / 2**4, abs=0.01)
+
+
+def test_each_look_takes_the_bow_for_the_stern_of_the_one_before() -> None:
+    pose = pose_of(0.0, 0.5, BOAT)
+    flips, classes = iter([2.0, -4.0]), iter([[0.0, 2.0], [0.0, 4.0]])
+
+    def answer(**_: np.ndarray) -> list[np.ndarray]:
+        still = [[[0.0, -3.0]], [[next(flips)]], [[0.0, 0.0, 0.0]], [[0.0, -1.0, -1.0]], [next(classes)]]
+        return [np.asarray(part, np.float32) for part in still]
+
+    found = heading.by_network(whole_hull(pose), pose, FakeModel(answer), looks=2)
+
+    # The first look says with 2 that the bow points the other way, the second with 4 that it is right now.
+    assert found.pose.heading == pytest.approx(frames.wrap_angle(pose.heading + math.pi))
+    assert found.flip_logit == pytest.approx(-3.0)
+    np.testing.assert_allclose(found.class_logits, [0.0, 3.0])
 
 
 def test_a_single_look_is_the_look_itself() -> None:

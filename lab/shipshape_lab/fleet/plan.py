@@ -44,6 +44,7 @@ QUICK = Plan(
     epochs={
         "sight": 2,
         "aligned": 8,
+        "points": 6,
         "inpainting": 5,
         "inpainting_": 1,
         "prior": 2,

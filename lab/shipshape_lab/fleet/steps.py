@@ -14,7 +14,8 @@ SECONDS = {
     "start": (0, 20),
     "inpainting": (2000, 300),
     "sight": (700, 90),
-    "aligned": (800, 180),
+    "aligned": (900, 180),
+    "points": (1300, 200),
     "inpainting_": (300, 50),
     "prior": (350, 80),
     "parts": (200, 30),
@@ -23,7 +24,7 @@ SECONDS = {
     "bundle": (150, 80),
     "evaluation": (150, 150),
 }
-NEEDS = {"spd2": ("inpainting", "sight", "aligned")}
+NEEDS = {"spd2": ("inpainting", "sight", "aligned", "points")}
 for _method in ImageMethod:
     NEEDS[f"spd2_{_method}"] = (f"inpainting_{_method}", "prior", "parts")
 

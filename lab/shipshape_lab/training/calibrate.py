@@ -37,7 +37,7 @@ class BestEvidence:
 
     turn_error: float  # rad, modulo pi
     heading_std: float  # rad, as the network says it
-    flip_logit: float
+    flip_logits: np.ndarray  # (2,): of the aligned looks and of the points
     flipped: bool  # whether the bow truly pointed the other way
     witnesses: np.ndarray  # (4, classes) probabilities in the order that fusion weighs them
     label: int
@@ -63,7 +63,7 @@ def calibrated(bundle: Bundle, validation: Examples, *, seed: int) -> tuple[dict
     weights = parameters["best"]["fusion_weights"]
     parameters["common"]["unknown_above"] = unknown_threshold(seen, weights)
     parameters["reasons"] = reason_thresholds(judged(seen, parameters, hidden_share))
-    return parameters, validation_scores(seen, weights)
+    return parameters, validation_scores(seen, parameters["best"])
 
 
 def _with(bundle: Bundle, parameters: dict) -> Bundle:
@@ -143,12 +143,13 @@ def _empty_below(pipeline: Pipeline, catalogue: list[Example]) -> float:
 def _best_evidence(pipeline: Pipeline, example: Example) -> BestEvidence:
     work = run_until(pipeline, example.contact, Options(Preset.BEST), "spd2")
     restored = classification.mean_confidence(work.images, pipeline.bundle.models["spd2"])
+    looks = (work.look.class_logits, work.points_look.class_logits, work.bottleneck)
     return BestEvidence(
         turn_error=frames.wrap_half_turn(work.look.pose.heading - example.pose.heading),
         heading_std=work.look.heading_std,
-        flip_logit=work.look.flip_logit,
+        flip_logits=np.array([work.look.flip_logit, work.points_look.flip_logit]),
         flipped=math.cos(work.look.pose.heading - example.pose.heading) < 0,
-        witnesses=np.stack([work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]),
+        witnesses=np.stack([work.prior, *map(softmax, looks), restored]),
         label=example.label,
         measures=measure(work),
         length_ratio=work.pose.size.length / example.pose.size.length,
@@ -159,16 +160,24 @@ def best_parameters(seen: list[BestEvidence]) -> dict:
     """Parameters of preset `best`."""
     known = [e for e in seen if e.label < len(e.witnesses[0]) - 1]
     scale, power = heading_spread(np.abs([e.turn_error for e in known]), np.array([e.heading_std for e in known]))
-    signs = np.array([e.flip_logit * (1 if e.flipped else -1) for e in known])
-    temperature = minimize_scalar(
-        lambda t: np.logaddexp(0, -signs / t).mean(), bounds=(0.2, 10.0), method="bounded"
-    ).x
     return {
         "heading_std_scale": scale,
         "heading_std_power": power,
-        "bow_temperature": float(temperature),
+        "bow_weights": bow_weights(known),
         "fusion_weights": _fusion_weights(_log_witnesses(seen), _labels(seen)).tolist(),
     }
+
+
+def bow_weights(seen: list[BestEvidence]) -> list[float]:
+    """Non-negative weights of the looks' log-odds under which the true bow is most likely."""
+    signs = np.array([e.flip_logits * (1 if e.flipped else -1) for e in seen])
+    found = minimize(
+        lambda weights: np.logaddexp(0, -signs @ weights).mean(),
+        [0.5, 0.5],
+        bounds=[(0.0, 5.0)] * 2,
+        method="L-BFGS-B",
+    )
+    return [float(weight) for weight in found.x]
 
 
 def heading_spread(errors: np.ndarray, said: np.ndarray) -> tuple[float, float]:
@@ -195,15 +204,15 @@ def judged(seen: list[BestEvidence], parameters: dict, hidden_share: np.ndarray)
     known = fused[:, :-1].max(axis=1)
     unknown = fused[:, -1] > np.minimum(known, parameters["common"]["unknown_above"])
     named = np.where(unknown, fused.shape[1] - 1, fused[:, :-1].argmax(axis=1))
-    certainty = np.abs([e.flip_logit for e in seen]) / parameters["best"]["bow_temperature"]
+    flips = _flips(seen, parameters["best"]["bow_weights"])
     return Judged(
         points=np.array([e.measures.points for e in seen]),
         off_ends_deg=np.array([e.measures.off_ends_deg for e in seen]),
         missing_share=np.array([e.measures.missing_share for e in seen]),
-        bow_probability=1.0 / (1.0 + np.exp(-np.minimum(certainty, 30.0))),
+        bow_probability=1.0 / (1.0 + np.exp(-np.minimum(np.abs(flips), 30.0))),
         catalogue=labels < fused.shape[1] - 1,
         named_right=named == labels,
-        bow_right=np.array([(e.flip_logit > 0) == e.flipped for e in seen]),
+        bow_right=(flips > 0) == [e.flipped for e in seen],
         length_right=np.abs(np.array([e.length_ratio for e in seen]) - 1.0) <= LENGTH_RIGHT,
         hidden_share=hidden_share,
     )
@@ -216,12 +225,12 @@ def unknown_threshold(seen: list[BestEvidence], weights: list[float]) -> float:
     return float(np.clip(np.quantile(known, KNOWN_KEPT), 0.05, 0.95))
 
 
-def validation_scores(seen: list[BestEvidence], weights: list[float]) -> dict:
+def validation_scores(seen: list[BestEvidence], best: dict) -> dict:
     """What preset `best` reaches on the set it was calibrated on: a sanity check, not evidence."""
-    fused, labels = _fused(seen, weights), _labels(seen)
+    fused, labels = _fused(seen, best["fusion_weights"]), _labels(seen)
     catalogue = labels < fused.shape[1] - 1
     errors = np.degrees(np.abs([e.turn_error for e in seen]))[catalogue]
-    bow = np.array([(e.flip_logit > 0) == e.flipped for e in seen])[catalogue]
+    bow = ((_flips(seen, best["bow_weights"]) > 0) == [e.flipped for e in seen])[catalogue]
     return {
         "validation": {
             "clusters": int(np.count_nonzero(catalogue)),
@@ -238,6 +247,10 @@ def _fused(seen: list[BestEvidence], weights: list[float]) -> np.ndarray:
 
 def _log_witnesses(seen: list[BestEvidence]) -> np.ndarray:
     return np.log(np.maximum(np.stack([e.witnesses for e in seen]), np.float32(1e-7)))
+
+
+def _flips(seen: list[BestEvidence], weights: list[float]) -> np.ndarray:
+    return np.array([e.flip_logits for e in seen]) @ weights
 
 
 def _labels(seen: list[BestEvidence]) -> np.ndarray:

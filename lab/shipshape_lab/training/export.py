@@ -11,8 +11,21 @@ from torch import Tensor, nn
 TOLERANCE = 1e-3  # largest difference of any output, absolute and relative to its spread
 
 
-def export(net: nn.Module, inputs: dict[str, Tensor], outputs: list[str], path: Path) -> None:
+def export(
+    net: nn.Module,
+    inputs: dict[str, Tensor],
+    outputs: list[str],
+    path: Path,
+    free: dict[str, dict[int, str]] | None = None,
+) -> None:
     """Write `net` to `path` with a free batch dimension, and compare ONNX Runtime with torch on random inputs.
+
+    Args:
+        net: the trained network.
+        inputs: an example of each input, in the order of `forward`.
+        outputs: names of the outputs.
+        path: file to write.
+        free: further free dimensions of inputs: name to dimension to its name.
 
     Raises:
         ValueError: an output differs by more than TOLERANCE.
@@ -28,7 +41,7 @@ def export(net: nn.Module, inputs: dict[str, Tensor], outputs: list[str], path: 
             str(path),
             input_names=list(inputs),
             output_names=outputs,
-            dynamic_axes={name: {0: "batch"} for name in [*inputs, *outputs]},
+            dynamic_axes={name: {0: "batch"} | (free or {}).get(name, {}) for name in [*inputs, *outputs]},
             opset_version=17,
             dynamo=False,
         )

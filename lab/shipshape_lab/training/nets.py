@@ -67,6 +67,40 @@ class AlignedNet(nn.Module):
         return turn, self.flip(seen), self.shift(seen), self.size(seen), self.classes(seen)
 
 
+def _pointwise(channels_in: int, channels_out: int) -> nn.Sequential:
+    # A 1 x 1 convolution over points: the quantiser knows it, and batch norm folds into it.
+    return nn.Sequential(
+        nn.Conv2d(channels_in, channels_out, 1, bias=False),
+        nn.BatchNorm2d(channels_out),
+        nn.ReLU(inplace=True),
+    )
+
+
+class PointsNet(nn.Module):
+    """Points in the vessel frame -> flip logit, class logits: a PointNet whose points hear of the whole once.
+
+    The greatest of each feature over all points says what is there; joined to every point, it lets the second
+    round judge a point by its place in the whole (as the encoder of PCN does).
+    """
+
+    def __init__(self, classes: int, planes: int = 6, features: int = 5) -> None:
+        super().__init__()
+        self.first = nn.Sequential(_pointwise(planes, 64), _pointwise(64, 96))
+        self.second = nn.Sequential(_pointwise(192, 192), _pointwise(192, 256))
+        self.mix = nn.Sequential(
+            nn.Linear(256 + features, 192), nn.ReLU(inplace=True), nn.Dropout(0.2), nn.Linear(192, 96), nn.ReLU()
+        )
+        self.flip, self.classes = nn.Linear(96, 1), nn.Linear(96, classes)
+
+    def forward(self, points: Tensor, features: Tensor) -> tuple[Tensor, Tensor]:
+        """Points (n, 6, 1, k) and features (n, 5) to the outputs named above, in that order."""
+        own = self.first(points)
+        whole = own.amax(dim=3, keepdim=True).expand_as(own)
+        seen = self.second(torch.cat([own, whole], dim=1)).amax(dim=(2, 3))
+        seen = self.mix(torch.cat([seen, features], dim=1))
+        return self.flip(seen), self.classes(seen)
+
+
 class UNet(nn.Module):
     """Four levels; the bottleneck is handed out beside the full-size features."""
 

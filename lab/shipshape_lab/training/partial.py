@@ -19,8 +19,8 @@ UNCALIBRATED = {
     "best": {
         "looks": 2,
         "heading_std_scale": 1.0,
-        "bow_temperature": 1.0,
-        "fusion_weights": [0.25, 0.25, 0.25, 0.25],
+        "bow_weights": [0.5, 0.5],
+        "fusion_weights": [0.2, 0.2, 0.2, 0.2, 0.2],
     },
 }
 

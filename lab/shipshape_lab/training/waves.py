@@ -7,6 +7,7 @@ WAVES = (
     (
         ("inpainting",),
         ("sight",),
+        ("points",),
         ("aligned",),
         *(("grey", "--method", method) for method in ImageMethod),
         ("spd2", "--model", "prior"),

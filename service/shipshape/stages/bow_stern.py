@@ -1,15 +1,16 @@
 """Bow or stern: which of the two opposite headings is right, with its probability; 0 and 180 are never averaged.
 
 `by_parts` is the paper's way (section 3.1.2): SPD2 images of keypoints are labelled bow, middle or stern part;
-`by_network` asks the network that looks at the aligned image.
+`by_networks` asks the networks that look at the aligned image and at the aligned points.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float32
 
-from shipshape.alignment import Look
+from shipshape.alignment import Look, PointsLook
 from shipshape.onnx_model import OnnxModel
 from shipshape.softmax import softmax
 from shipshape.types import Pose
@@ -50,9 +51,15 @@ def by_parts(
     return _settle(pose, flip_logit=-sharpness * votes)
 
 
-def by_network(found: Look, *, temperature: float) -> tuple[Pose, float]:
-    """Pose with the bow the way the aligned look saw it, and the calibrated probability of that."""
-    return _settle(found.pose, flip_logit=found.flip_logit / temperature)
+def by_networks(found: Look, points: PointsLook, *, weights: Sequence[float]) -> tuple[Pose, float]:
+    """Pose with the bow the way both looks see it, and the calibrated probability of that.
+
+    Args:
+        found: the aligned looks.
+        points: the look at the points in the pose that those left.
+        weights: of the log-odds of either, fitted on validation.
+    """
+    return _settle(found.pose, flip_logit=float(np.dot(weights, [found.flip_logit, points.flip_logit])))
 
 
 def _settle(pose: Pose, *, flip_logit: float) -> tuple[Pose, float]:

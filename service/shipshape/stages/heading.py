@@ -109,8 +109,20 @@ def first_pose(points_sight: Float32[np.ndarray, "n 3"], sight: SightFrame, mode
 
 
 def by_network(points_level: Float32[np.ndarray, "n 3"], pose: Pose, model: OnnxModel, *, looks: int) -> Look:
-    """Correct a coarse pose by `looks` looks in the aligned frame, each from where the last one led."""
-    found = look(points_level, pose, model)
+    """Correct a coarse pose by `looks` looks in the aligned frame, each from where the last one led.
+
+    Every look but the first takes the bow for the stern of the one before: it sees another image of the same
+    cluster, so that the mean of what they say of bow and class is better than each alone.
+    """
+    found = [look(points_level, pose, model)]
     for _ in range(looks - 1):
-        found = look(points_level, found.pose, model)
-    return found
+        found.append(look(points_level, found[-1].pose.turned(math.pi), model))
+    last = found[-1]
+    directions = (-1.0) ** np.arange(looks - 1, -1, -1)
+    class_logits: Float32[np.ndarray, " classes"] = np.stack([one.class_logits for one in found]).mean(axis=0)
+    return Look(
+        pose=last.pose,
+        heading_std=last.heading_std,
+        flip_logit=float(np.mean(directions * [one.flip_logit for one in found])),
+        class_logits=class_logits,
+    )
