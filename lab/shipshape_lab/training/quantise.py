@@ -1,8 +1,7 @@
 """Static int8 for the networks of preset `best`; those of the paper stay float32.
 
 Ranges are fitted on training examples as quantisation-aware training saw them (`fake_quantise`): moving averages
-over batches. The extremes of all examples, the tool's default, cost a tenth of the class accuracy of
-`aligned` on validation.
+over batches. The extremes of all examples, the tool's default, suit other weights than these: docs/adr/0012.
 """
 
 import logging
