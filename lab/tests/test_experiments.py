@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from thin_grid import thin_grid
 from untrained import write_untrained
 
 from shipshape.bundle import load_bundle
@@ -14,24 +15,17 @@ from shipshape_lab.experiments import evaluate, numbers, predictions, report, re
 from shipshape_lab.experiments.predictions import Answers, Truth
 from shipshape_lab.experiments.systems import BEST, IMAGE_METHODS, run_systems
 from shipshape_lab.simulator import datasets
-from shipshape_lab.simulator.clusters import collect, save
+from shipshape_lab.simulator.clusters import save
 from shipshape_lab.training.examples import Examples
-
-CELLS = (8 * 360 + 40, 4 * 360 + 200, 3240 + 8 * 360)  # a far and a middling rhib, a far pilot boat bow-on
 
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    """Three cells of the paper grid, a fourth with too few points to be answered."""
     folder = tmp_path_factory.mktemp("data")
-    job = datasets.Job("P", len(CELLS), 3)
-    scans = [datasets.grid_cluster(job, cell) for cell in CELLS]
-    thin, sensor = scans[0]
-    scans.append((thin.__class__(**{**vars(thin), "points_level": thin.points_level[:4]}), sensor))
-    clusters = collect(scans, job.catalogue, job.seed)
+    clusters = thin_grid()
     save(folder / "P.npz", clusters)
     pairs = sorted(set(zip(clusters.label.tolist(), clusters.hull_seed.tolist(), strict=True)))
-    hulls = [(job.catalogue.classes[label], seed) for label, seed in pairs]
+    hulls = [(str(clusters.classes[label]), seed) for label, seed in pairs]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(datasets, "SURFACE_POINTS", 6_000)
         save(folder / "P_surfaces.npz", datasets.make_surfaces(hulls, progress=False))

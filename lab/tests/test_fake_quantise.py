@@ -1,9 +1,11 @@
 import pytest
 
-torch = pytest.importorskip("torch")
+pytest.importorskip("torch", reason="training needs torch, which only `make torch` installs")
 
-from shipshape_lab.training.fake_quantise import RoundedConv, rounded  # noqa: E402
-from shipshape_lab.training.nets import AlignedNet, InpaintingNet  # noqa: E402
+import torch
+
+from shipshape_lab.training.fake_quantise import RoundedConv, rounded
+from shipshape_lab.training.nets import AlignedNet, InpaintingNet
 
 INPUTS = {AlignedNet: (9, 3), InpaintingNet: (18, 3)}
 

@@ -3,12 +3,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch", reason="torch is missing: make torch adds it")
+pytest.importorskip("torch", reason="torch is missing: make torch adds it")
 
-from shipshape import raster  # noqa: E402
-from shipshape_lab.fleet import start  # noqa: E402
-from shipshape_lab.training import loop, train_aligned, train_inpainting  # noqa: E402
-from shipshape_lab.training.nets import AlignedNet, InpaintingNet, SightNet  # noqa: E402
+import torch
+
+from shipshape import raster
+from shipshape_lab.fleet import start
+from shipshape_lab.training import loop, train_aligned, train_inpainting
+from shipshape_lab.training.nets import AlignedNet, InpaintingNet, SightNet
 
 SIGHT = Path(__file__).parents[2] / "models/sight.onnx"
 EDGES = raster.aligned_frame(1.0).edges

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from thin_grid import thin_grid
 from untrained import PARAMETERS, SPD2, _constant_onnx, write_untrained
 
 from shipshape.bundle import load_bundle
@@ -15,21 +16,13 @@ from shipshape_lab.experiments import ablation, experiment_2, heading_peers
 from shipshape_lab.experiments.pages import ablation as ablation_page
 from shipshape_lab.experiments.pages import experiment_2 as experiment_2_page
 from shipshape_lab.experiments.pages import heading_peers as heading_page
-from shipshape_lab.simulator import datasets
-from shipshape_lab.simulator.clusters import collect, load, save
-
-CELLS = (8 * 360 + 40, 4 * 360 + 200, 3240 + 8 * 360)  # a far and a middling rhib, a far pilot boat bow-on
+from shipshape_lab.simulator.clusters import load, save
 
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    """Three cells of the paper grid, and a fourth cluster of too few points to be answered."""
     folder = tmp_path_factory.mktemp("data")
-    job = datasets.Job("P", len(CELLS), 3)
-    scans = [datasets.grid_cluster(job, cell) for cell in CELLS]
-    thin, sensor = scans[0]
-    scans.append((thin.__class__(**{**vars(thin), "points_level": thin.points_level[:4]}), sensor))
-    save(folder / "P.npz", collect(scans, job.catalogue, job.seed))
+    save(folder / "P.npz", thin_grid())
     return folder
 
 

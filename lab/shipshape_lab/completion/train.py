@@ -26,7 +26,7 @@ from shipshape_lab.completion import validate
 from shipshape_lab.completion.clouds import to_item
 from shipshape_lab.completion.load import Completer
 from shipshape_lab.completion.plans import MODELS, PLANS, SCHEDULES, Plan, loss_of
-from shipshape_lab.training import loop
+from shipshape_lab.training import arguments, loop, weights
 from shipshape_lab.training.examples import Examples
 
 IN_BETWEEN = 200  # validation clusters after a round
@@ -84,13 +84,6 @@ def trained(args: argparse.Namespace, plan: Plan, validation: Examples) -> tuple
     return net, progress.rounds
 
 
-def write(folder: Path, net: nn.Module, about: dict) -> None:
-    """Weights and what belongs to them; completer.json comes last, so that a folder that has it is whole."""
-    folder.mkdir(parents=True, exist_ok=True)
-    torch.save(net.state_dict(), folder / "weights.pt")
-    (folder / "completer.json").write_text(json.dumps(about, indent=2) + "\n")
-
-
 def main(argv: list[str] | None = None) -> None:
     """Train, or go on training, validate and write."""
     args = _arguments(argv)
@@ -104,10 +97,10 @@ def main(argv: list[str] | None = None) -> None:
         "with_measured": helps,
         "validation": found,
         "rounds": rounds,
-        "parameters": sum(weights.numel() for weights in net.parameters()),
+        "parameters": sum(values.numel() for values in net.parameters()),
         "training": {"seed": args.seed, "commit": code_commit(), "clusters": plan.rounds * plan.clusters},
     }
-    write(args.out / args.model, net, about)
+    weights.write(args.out / args.model, net, "completer.json", about)
     print(f"{args.model}, {args.schedule}: {found}")
 
 
@@ -119,13 +112,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         "--out", type=Path, required=True, help="folder for checkpoints/ and a folder for each network"
     )
     parser.add_argument("--schedule", choices=SCHEDULES, default="reduced", help="how long (default reduced)")
-    parser.add_argument("--seed", type=int, default=1, help="seed of initialisation and draws (default 1)")
-    parser.add_argument("--threads", type=int, default=0, help="CPU threads (default: all)")
-    args = parser.parse_args(argv)
-    if args.threads:
-        torch.set_num_threads(args.threads)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-    return args
+    return arguments.prepared(parser, argv)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,6 @@ Stopped and started again, training goes on after the last whole epoch.
 """
 
 import argparse
-import json
-import logging
 from dataclasses import asdict
 from pathlib import Path
 
@@ -29,7 +27,7 @@ from shipshape_lab.peers import mirrored
 from shipshape_lab.peers.clouds import network_inputs
 from shipshape_lab.peers.load import NETWORKS, answering
 from shipshape_lab.peers.validate import validated
-from shipshape_lab.training import loop, train_spd2
+from shipshape_lab.training import arguments, loop, train_spd2, weights
 from shipshape_lab.training.examples import Examples
 
 EPOCHS = {"pointnet": 8, "pointnet2": 7, "mirrored_spd2": 4}
@@ -77,13 +75,6 @@ def trained(args: argparse.Namespace, examples: Examples) -> nn.Module:
     return loop.train(net, data, train_spd2.loss_of, schedule, checkpoint)
 
 
-def write(folder: Path, net: nn.Module, about: dict) -> None:
-    """Weights and what belongs to them; peer.json comes last, so that a folder that has it is whole."""
-    folder.mkdir(parents=True, exist_ok=True)
-    torch.save(net.state_dict(), folder / "weights.pt")
-    (folder / "peer.json").write_text(json.dumps(about, indent=2) + "\n")
-
-
 def main(argv: list[str] | None = None) -> None:
     """Train, or go on training, validate and write."""
     args = _arguments(argv)
@@ -98,7 +89,7 @@ def main(argv: list[str] | None = None) -> None:
         "catalogue": [asdict(vessel) for vessel in examples.catalogue],
         "training": {"seed": args.seed, "commit": code_commit(), "clusters": len(examples)},
     }
-    write(folder, net, about)
+    weights.write(folder, net, "peer.json", about)
     print(f"{args.model} in {folder}: temperature {temperature:.3f}, {scores}")
 
 
@@ -111,13 +102,7 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--bundle", type=Path, default=Path("models"), help="mirrored_spd2: networks of the pose")
     parser.add_argument("--epochs", type=int, help=f"passes over the data (default {EPOCHS})")
-    parser.add_argument("--seed", type=int, default=1, help="seed of initialisation and draws (default 1)")
-    parser.add_argument("--threads", type=int, default=0, help="CPU threads (default: all)")
-    args = parser.parse_args(argv)
-    if args.threads:
-        torch.set_num_threads(args.threads)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-    return args
+    return arguments.prepared(parser, argv)
 
 
 if __name__ == "__main__":

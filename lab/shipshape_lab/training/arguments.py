@@ -23,10 +23,15 @@ def parse(
     parser.add_argument("--data", type=Path, required=True, help="folder of the data sets")
     parser.add_argument("--out", type=Path, required=True, help="folder for checkpoints/ and bundle/")
     parser.add_argument("--epochs", type=int, default=epochs, help=f"passes over the data (default {epochs})")
-    parser.add_argument("--seed", type=int, default=1, help="seed of initialisation and draws (default 1)")
-    parser.add_argument("--threads", type=int, default=0, help="CPU threads (default: all)")
     for name, values in choices.items():
         parser.add_argument(f"--{name}", choices=[str(value) for value in values], required=True)
+    return prepared(parser, argv)
+
+
+def prepared(parser: argparse.ArgumentParser, argv: list[str] | None) -> argparse.Namespace:
+    """Parse what the parser has, with --seed and --threads beside it, and set up logging and torch's threads."""
+    parser.add_argument("--seed", type=int, default=1, help="seed of initialisation and draws (default 1)")
+    parser.add_argument("--threads", type=int, default=0, help="CPU threads (default: all)")
     args = parser.parse_args(argv)
     if args.threads:
         torch.set_num_threads(args.threads)
