@@ -24,7 +24,7 @@ from shipshape_lab import metrics
 from shipshape_lab.experiments import generative_figure, generative_spread, outcome
 from shipshape_lab.experiments.generative_spread import DETERMINISTIC, TENTH
 from shipshape_lab.experiments.numbers import Numbers
-from shipshape_lab.experiments.predictions import digest_of, digest_of_folder
+from shipshape_lab.experiments.predictions import digest_of
 from shipshape_lab.experiments.restoration import EVERY, SCORES, score
 from shipshape_lab.experiments.restore_ms import contacts_of, machine, measure
 from shipshape_lab.experiments.systems import Run
@@ -115,7 +115,8 @@ def on_set(name: str, args: argparse.Namespace, pipelines: dict[str, Pipeline]) 
     index = np.arange(0, len(examples.clusters), every)
     path = args.out / f"generative_{name.lower()}.npz"
     digests = [pipe.bundle.digest for pipe in pipelines.values()]
-    key = [*digests, digest_of(args.data / f"{name}.npz"), digest_of_folder(args.flows), str(every)]
+    files = [args.data / f"{name}.npz", *(args.flows / f"{system}.onnx" for system in SYSTEMS[1:])]
+    key = [*digests, digest_of(*files), str(every)]
     kept = _kept(path, key)
     if kept is None:
         samplers = generative_spread.samplers_of(pipelines, args.flows)

@@ -19,7 +19,7 @@ NAME = "generative.png"
 SYSTEM = "flow_4"
 DRAWN = 3
 ROWS = ((1, 60), (3, 90), (2, 130))  # number in the catalogue, and about how far, m
-HEADS = ("measured", "deterministic", "sample 1", "sample 2", "sample 3", "truth")
+HEADS = ("measured", "deterministic", "flow, sample 1", "flow, sample 2", "flow, sample 3", "truth")
 
 
 def draw(samplers: dict[str, Pipeline], examples: Examples, folder: Path) -> Path:

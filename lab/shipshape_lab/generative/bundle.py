@@ -1,6 +1,7 @@
-"""Write a bundle whose restorer is the generative one: the service runs it as it runs any other.
+r"""Write a bundle whose restorer is the generative one: the service runs it as it runs any other.
 
-python -m shipshape_lab.generative.bundle --flow runs/generative/flow_4.onnx --data runs/data --to runs/bundle_4
+python -m shipshape_lab.generative.bundle --flow runs/generative/flow_4.onnx --data runs/data \
+  --to runs/generative/bundle_4
 
 All networks are the base bundle's but inpainting.onnx: the flow, its steps unrolled, its noise drawn once by
 --seed and kept in the file, so that one cluster always gets one answer. What is calibrated is calibrated again
