@@ -33,7 +33,7 @@ PARAMETERS: Mapping[str, Any] = {
         "looks": 2,
         "heading_std_scale": 1.0,
         "bow_weights": [0.5, 0.5],
-        "fusion_weights": [0.4, 0.3, 0.1, 0.1, 0.1],
+        "fusion_weights": [0.4, 0.3, 0.2, 0.1],
     },
 }
 
@@ -41,11 +41,11 @@ PARAMETERS: Mapping[str, Any] = {
 class _Graph:
     """Collects the nodes of a network; every method returns the name of what it computes."""
 
-    def __init__(self, seed: int, **inputs: tuple[int | str, ...]) -> None:
+    def __init__(self, seed: int, *, counts: str = "", **inputs: tuple[int | str, ...]) -> None:
         self._rng = np.random.default_rng(seed)
+        kinds = {name: TensorProto.INT64 if name == counts else TensorProto.FLOAT for name in inputs}
         self._inputs = [
-            helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *shape])
-            for name, shape in inputs.items()
+            helper.make_tensor_value_info(name, kinds[name], ["batch", *shape]) for name, shape in inputs.items()
         ]
         self._nodes: list[onnx.NodeProto] = []
         self._weights: list[onnx.TensorProto] = []
@@ -91,14 +91,19 @@ def spd2_network(classes: int, seed: int, favourite: int | None = None) -> OnnxM
     return graph.model(logits=graph.linear(graph.node("Flatten", "images"), 5 * 16 * 32, middle, 1.0))
 
 
-def sight_network() -> OnnxModel:
-    """Planes along the line of sight -> axis near 45 degrees to it, small shift, about 12 x 4 x 3 m."""
-    graph = _Graph(11, planes=(3, 64, 64), features=(4,))
-    seen = graph.node("Concat", graph.pooled("planes"), "features", axis=1)
+def points_network() -> OnnxModel:
+    """Groups of points -> axis near 45 degrees to the line of sight, small shift, about 12 x 4 x 3 m, logits."""
+    groups = {"near": (6, "groups", 16), "members": ("members",), "far": (3, "wholes", 16)}
+    graph = _Graph(11, counts="members", **groups, centres=(3, "wholes", 1), features=(3,))
+    told = graph.node("Mul", graph.node("Cast", "members", to=TensorProto.FLOAT), graph.weights(np.float32(0.01)))
+    pooled = [*map(graph.pooled, ("near", "far", "centres")), graph.node("ReduceMean", told, axes=[1])]
+    seen = graph.node("Concat", *pooled, "features", axis=1)
     return graph.model(
-        axis=graph.linear(seen, 7, (1.0, 0.0), 0.2),
-        shift=graph.linear(seen, 7, (0.1, 0.0), 0.1),
-        size=graph.linear(seen, 7, tuple(np.log([12.0, 4.0, 3.0])), 0.1),
+        axis=graph.linear(seen, 16, (1.0, 0.0), 0.2),
+        shift=graph.linear(seen, 16, (0.04, 0.0), 0.04),
+        size=graph.linear(seen, 16, tuple(np.log([12.0, 4.0, 3.0])), 0.1),
+        bow=graph.linear(seen, 16, (-1.0, 0.0), 0.5),
+        classes=graph.linear(seen, 16, (0.0, 2.0, 0.0, 0.0), 0.5),
     )
 
 
@@ -112,16 +117,6 @@ def aligned_network() -> OnnxModel:
         shift=graph.linear(seen, 12, (0.02, 0.0, 0.0), 0.02),
         size=graph.linear(seen, 12, tuple(np.log([1.0, 1 / 3, 1 / 4])), 0.05),
         classes=graph.linear(seen, 12, (0.0, 3.0, 0.0, 0.0), 0.5),
-    )
-
-
-def points_network() -> OnnxModel:
-    """Aligned points -> a bow that points the opposite way, logits."""
-    graph = _Graph(14, points=(6, 1, "points"), features=(5,))
-    seen = graph.node("Concat", graph.pooled("points"), "features", axis=1)
-    return graph.model(
-        flip=graph.linear(seen, 11, (2.0,), 0.5),
-        classes=graph.linear(seen, 11, (0.0, 2.0, 0.0, 0.0), 0.5),
     )
 
 
@@ -152,7 +147,6 @@ def untrained_bundle() -> Bundle:
     models = {
         "prior": spd2_network(CLASSES, 1, favourite=1),
         "parts": spd2_network(3, 2),
-        "sight": sight_network(),
         "aligned": aligned_network(),
         "points": points_network(),
         "inpainting": inpainting_network(),

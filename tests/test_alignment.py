@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import ANGLES, BOAT, constant, heading_error_deg, place, properties, random_points
-from shipshape.alignment import correct, look, look_at_points, look_inputs, point_inputs
+from shipshape.alignment import correct, look, look_inputs
 from shipshape.types import Pose, ReferenceBox
 
 GUESS = Pose(0.4, (40.0, -10.0, -3.0), BOAT)
@@ -74,26 +74,3 @@ def test_a_look_sees_the_vessel_and_not_where_the_sensor_stands(heading: float, 
     np.testing.assert_allclose(planes, straight, atol=1e-4)
     np.testing.assert_allclose(features, [math.log(12.0), math.log(50.0), math.log(40)], atol=1e-5)
     np.testing.assert_allclose(known, [math.log(12.0), 0.0, math.log(40)], atol=1e-6)
-
-
-@pytest.mark.parametrize(("count", "shown"), [(1, 1), (255, 255), (256, 256), (257, 129), (1000, 250)])
-def test_the_network_of_points_is_shown_an_even_share(count: int, shown: int) -> None:
-    points = random_points(count, seed=2) + np.float32([40, -10, 0])
-
-    planes, features = point_inputs(points, GUESS)
-
-    assert planes.shape == (6, 1, shown)
-    expected = GUESS.to_vessel(points[:: math.ceil(count / 256)])
-    np.testing.assert_allclose(planes[:3, 0].T, expected / 10.0, atol=1e-6)
-    np.testing.assert_allclose(planes[3:, 0].T, expected / BOAT.length, atol=1e-6)
-    size = [BOAT.length, BOAT.beam, BOAT.height, math.hypot(40.0, 10.0), count]
-    np.testing.assert_allclose(features, np.log(size), rtol=1e-6)
-
-
-def test_a_look_at_points_hands_on_what_the_network_said() -> None:
-    points = random_points(20, seed=3) + np.float32([40, -10, 0])
-
-    found = look_at_points(points, GUESS, constant([[-0.5]], [[3.0, 1.0]]))
-
-    assert found.flip_logit == -0.5
-    np.testing.assert_array_equal(found.class_logits, [3.0, 1.0])

@@ -150,7 +150,7 @@ def test_a_bundle_whose_parts_belong_together_fits():
         ("best", "bow_weights", [1.0]),
         ("best", "fusion_weights", [0.5, 0.5]),
         ("best", "fusion_weights", 0.5),
-        ("best", "fusion_weights", [0.4, 0.3, 0.2, 0.1, "0.1"]),
+        ("best", "fusion_weights", [0.4, 0.3, 0.2, "0.1"]),
     ],
 )
 def test_a_parameter_that_the_stages_cannot_use_is_refused_in_one_sentence(table, key, value):

@@ -280,3 +280,41 @@ def test_an_empty_image_gives_nothing() -> None:
 
 def test_a_top_below_its_bottom_still_gives_one_point() -> None:
     np.testing.assert_allclose(lift_one(top=0.3, bottom=0.6), [[2.75, 1.375, 0.3]])
+
+
+@properties(30)
+@given(SEEDS, st.integers(1, 120), st.integers(1, 150))
+def test_each_sampled_point_is_the_farthest_from_those_before(seed: int, count: int, most: int) -> None:
+    points = random_points(count, seed)
+
+    chosen = kernels.farthest_points(points, most)
+
+    assert chosen[0] == 0
+    assert len(set(chosen.tolist())) == len(chosen) == min(count, most)
+    for k in range(1, len(chosen)):
+        reach = cKDTree(points[chosen[:k]].astype(np.float64)).query(points)[0]
+        assert reach[chosen[k]] >= reach.max() - 1e-5
+
+
+def test_coinciding_points_are_sampled_once_each() -> None:
+    assert sorted(kernels.farthest_points(np.ones((5, 3), np.float32), 8)) == [0, 1, 2, 3, 4]
+
+
+@properties(30)
+@given(SEEDS, st.integers(1, 120), st.floats(0.1, 3.0), st.integers(1, 20))
+def test_a_ball_shows_an_even_share_of_what_scipy_finds_in_it(
+    seed: int, count: int, radius: float, most: int
+) -> None:
+    points = random_points(count, seed)
+    centres = points[::3].copy()
+
+    members = kernels.in_ball(points, centres, radius, most)
+
+    assert members.shape == (len(centres), most)
+    tree = cKDTree(points.astype(np.float64))
+    for c, found in enumerate(members.tolist()):
+        tight, wide = (sorted(tree.query_ball_point(points[3 * c], r)) for r in (radius - 1e-5, radius + 1e-5))
+        if tight != wide:
+            continue  # a point on the very edge may fall on either side
+        assert found == [tight[k * len(tight) // most] for k in range(most)]
+        assert set(found) == set(tight) or len(tight) > most

@@ -21,7 +21,7 @@ from shipshape_lab.training.calibrate import (
 )
 
 CLASSES = 4  # three vessels and "unknown"
-ONLY_THE_FIRST = [1.0, 0.0, 0.0, 0.0, 0.0]
+ONLY_THE_FIRST = [1.0, 0.0, 0.0, 0.0]
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def seen():
                 heading_std=said,  # half of what it is
                 flip_logits=np.array([3.0 * true_logit, rng.normal()]),  # three times too sure, and a guess
                 flipped=bool(rng.random() < 1 / (1 + np.exp(-true_logit))),
-                witnesses=softmax(np.stack([logits, noise, noise, noise, noise]).astype(np.float32)),
+                witnesses=softmax(np.stack([logits, noise, noise, noise]).astype(np.float32)),
                 label=label,
                 measures=Measures(50, 60.0, 0.1, 0.9),
                 length_ratio=float(rng.choice([0.95, 1.2])),
@@ -113,11 +113,11 @@ def test_training_all_skips_what_is_there_and_names_every_network(tmp_path, monk
     started = []
     monkeypatch.setattr(train_all, "_run", lambda module, arguments, work, name: started.append(name))
     (tmp_path / "default/bundle").mkdir(parents=True)
-    (tmp_path / "default/bundle/sight.onnx").touch()
+    (tmp_path / "default/bundle/points.onnx").touch()
     steps = [step for wave in train_all.WAVES for step in wave]
     for step in steps:
         train_all.train_step(step, tmp_path)
-    assert "sight" not in started
+    assert "points" not in started
     assert len(started) == len(steps) - 1
     files = {train_all.network_file(step) for step in steps}
-    assert len(files) == len(steps) == 15
+    assert len(files) == len(steps) == 14

@@ -217,8 +217,8 @@ def script(name):
 
 
 def test_training_items_can_be_made(data, tmp_path):
-    aligned, inpainting, grey, sight, spd2 = (
-        script(f"train_{name}") for name in ("aligned", "inpainting", "grey", "sight", "spd2")
+    aligned, inpainting, grey, points, spd2 = (
+        script(f"train_{name}") for name in ("aligned", "inpainting", "grey", "points", "spd2")
     )
     examples = Examples.read(data, "train", catalogue_only=True)
     rng = np.random.default_rng(0)
@@ -226,7 +226,7 @@ def test_training_items_can_be_made(data, tmp_path):
     assert aligned.to_item(example, aligned.guess(example, rng))["label"] == example.label
     assert inpainting.to_item(example, inpainting.guess(example, rng))["occupied"].any()
     assert grey.to_item(example, ImageMethod.FULL_SIDE, examples.boxes)["whole"].any()
-    assert sight.to_item(example)["planes"].any()
+    assert points.to_item(example)["near"].any()
     for model, classes in (("parts", 3), ("prior", len(NAMES) + 1)):
         describe, count = spd2.source(model, tmp_path, examples.catalogue)
         images, labels = describe(example, rng)

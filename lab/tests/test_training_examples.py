@@ -7,15 +7,18 @@ import pytest
 
 pytest.importorskip("torch", reason="training needs torch, which only `make torch` installs")
 
-from shipshape import alignment, raster, sight
+import torch
+
+from shipshape import alignment, first_look, raster, sight
 from shipshape.onnx_model import OnnxModel
 from shipshape.raster import FilledLayers
-from shipshape.stages import heading, lifting, projection
+from shipshape.stages import lifting, projection
 from shipshape_lab.metrics import CompleteSurface, chamfer_l1
 from shipshape_lab.simulator import datasets
 from shipshape_lab.simulator.datasets import Job
-from shipshape_lab.training import train_aligned, train_inpainting, train_sight
+from shipshape_lab.training import train_aligned, train_inpainting, train_points
 from shipshape_lab.training.examples import Examples, mirrored
+from shipshape_lab.training.nets import PointsNet
 from shipshape_lab.training.poses import disturbed
 
 
@@ -63,16 +66,33 @@ def test_a_mirrored_cluster_lies_on_its_mirrored_surface(examples):
     assert np.median(truth.nearest(example.contact.points_level).to_surface) < 0.15
 
 
-def test_the_sight_targets_lead_to_the_true_pose(examples):
+def test_the_targets_of_the_first_look_lead_to_the_true_pose(examples):
     for i in examples.indices[:6]:
         example = examples.example(int(i))
-        item = train_sight.to_item(example)
+        item = train_points.to_item(example)
         frame = sight.sight_frame(example.contact)
         points = sight.to_sight(example.contact.points_level, frame)
-        network = Answers(item["axis"], item["shift"], item["size"])
-        found = heading.first_pose(points, frame, network)
-        same_pose(found, example.pose, modulo=math.pi)
-        assert found.size.length == pytest.approx(example.pose.size.length, rel=1e-3)
+        cosine, sine = item["heading"]
+        axis = (2 * sine * cosine, cosine**2 - sine**2)
+        network = Answers(axis, item["step"], item["size"], item["heading"], np.zeros(6))
+        found = first_look.first_look(points, frame, network)
+        same_pose(found.pose, example.pose, modulo=math.pi)
+        assert found.pose.size.length == pytest.approx(example.pose.size.length, rel=1e-3)
+        assert found.flip_logit(example.pose) == pytest.approx(-2.0, abs=1e-3)
+
+
+def test_repeated_groups_change_nothing_that_the_network_says(examples):
+    example = next(e for e in map(examples.example, examples.indices) if len(e.contact.points_level) < 60)
+    frame = sight.sight_frame(example.contact)
+    alone = first_look.network_inputs(sight.to_sight(example.contact.points_level, frame), frame)
+    torch.manual_seed(0)
+    net = PointsNet(6).eval()
+    few, filled = (
+        net(*(torch.from_numpy(shown[name].copy())[None] for name in train_points.INPUTS))
+        for shown in (alone, train_points.filled(alone))
+    )
+    for want, got in zip(few, filled, strict=True):
+        torch.testing.assert_close(got, want)
 
 
 def test_the_aligned_targets_lead_from_a_disturbed_pose_to_the_true_one(examples):

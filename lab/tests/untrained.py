@@ -13,6 +13,13 @@ from shipshape_lab.simulator.catalogue import DEFAULT
 
 SPD2 = {"images": (5, 16, 32)}
 LOOK = {"planes": (9, 32, 64), "features": (3,)}
+GROUPS = {
+    "near": (6, "groups", 16),
+    "members": ("members",),
+    "far": (3, "wholes", 16),
+    "centres": (3, "wholes", 1),
+    "features": (3,),
+}
 PARAMETERS = {
     "common": {"prior_temperature": 1.0, "spd2_radius": 2.0, "unknown_above": 0.5},
     "paper": {
@@ -26,7 +33,7 @@ PARAMETERS = {
         "looks": 2,
         "heading_std_scale": 1.0,
         "bow_weights": [0.5, 0.5],
-        "fusion_weights": [1.0, 1.0, 1.0, 1.0, 1.0],
+        "fusion_weights": [1.0, 1.0, 1.0, 1.0],
     },
 }
 
@@ -69,15 +76,20 @@ def _networks() -> dict:
         "offset": np.zeros((2, 3, 32, 64)),
         "classes": logits,
     }
-    sight = {"axis": np.array([1.0, 0.0]), "shift": np.zeros(2), "size": np.log([12.0, 4.0, 4.0])}
+    first = {
+        "axis": np.array([1.0, 0.0]),
+        "shift": np.zeros(2),
+        "size": np.log([12.0, 4.0, 4.0]),
+        "bow": np.zeros(2),
+        "classes": logits,
+    }
     grey = {"filled": np.pad(np.full((3, 20, 40), 0.5), ((0, 0), (22, 22), (12, 12)))}
     networks = {
         "prior": (SPD2, {"logits": logits}),
         "spd2": (SPD2, {"logits": logits}),
         "parts": (SPD2, parts),
-        "sight": ({"planes": (3, 64, 64), "features": (4,)}, sight),
         "aligned": (LOOK, aligned),
-        "points": ({"points": (6, 1, "points"), "features": (5,)}, {"flip": np.zeros(1), "classes": logits}),
+        "points": (GROUPS, first),
         "inpainting": ({"planes": (18, 32, 64), "features": (3,)}, inpainting),
     }
     for method in ImageMethod:
@@ -88,7 +100,8 @@ def _networks() -> dict:
 
 def _constant_onnx(inputs: dict[str, tuple], outputs: dict[str, np.ndarray]) -> bytes:
     """Repeats each output once a row of the first input; every input must be used, or ONNX drops it."""
-    specs = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", *s]) for n, s in inputs.items()]
+    kinds = {name: TensorProto.INT64 if name == "members" else TensorProto.FLOAT for name in inputs}
+    specs = [helper.make_tensor_value_info(n, kinds[n], ["batch", *s]) for n, s in inputs.items()]
     made = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", *v.shape]) for n, v in outputs.items()]
     first = next(iter(inputs))
     nodes = [

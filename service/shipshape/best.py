@@ -3,8 +3,8 @@
 import numpy as np
 
 from shipshape import raster
-from shipshape.alignment import look_at_points
 from shipshape.bundle import Bundle
+from shipshape.first_look import first_look
 from shipshape.softmax import softmax
 from shipshape.stages import bow_stern, classification, heading, inpainting, lifting, projection
 from shipshape.work import Work
@@ -18,21 +18,24 @@ class BestMethod:
         self._parameters = bundle.parameters["best"]
         self._longest = max(vessel.box.length for vessel in bundle.catalogue)
 
+    def prior(self, work: Work) -> None:
+        """The first look at the points; it also gives the heading its start and the bow a witness."""
+        work.first = first_look(work.points_sight, work.sight, self._models["points"])
+        work.prior = softmax(work.first.class_logits)
+
     def heading(self, work: Work) -> None:
-        """One look along the line of sight, then looks in the aligned frame."""
-        pose = heading.first_pose(work.points_sight, work.sight, self._models["sight"])
+        """Looks in the aligned frame, from the coarse pose of the first look on."""
         work.look = heading.by_network(
-            work.contact.points_level, pose, self._models["aligned"], looks=self._parameters["looks"]
+            work.contact.points_level, work.first.pose, self._models["aligned"], looks=self._parameters["looks"]
         )
         work.pose = work.look.pose
         power = self._parameters.get("heading_std_power", 1.0)  # older bundles scale alone
         work.heading_std = self._parameters["heading_std_scale"] * work.look.heading_std**power
 
     def bow_stern(self, work: Work) -> None:
-        """The aligned looks saw the bow, and the points themselves show it too."""
-        work.points_look = look_at_points(work.contact.points_level, work.look.pose, self._models["points"])
+        """All looks saw the bow; their log-odds are weighted as validation says."""
         work.pose, work.bow_probability = bow_stern.by_networks(
-            work.look, work.points_look, weights=self._parameters["bow_weights"]
+            work.look, work.first, weights=self._parameters["bow_weights"]
         )
 
     def projection(self, work: Work) -> None:
@@ -55,10 +58,9 @@ class BestMethod:
         )
 
     def classification(self, work: Work) -> None:
-        """Prior, aligned looks, aligned points, bottleneck and restored cloud, weighted as validation says."""
+        """Prior, aligned looks, bottleneck and restored cloud, weighted as validation says."""
         restored = classification.mean_confidence(work.images, self._models["spd2"])
-        looks = (work.look.class_logits, work.points_look.class_logits, work.bottleneck)
-        evidence = [work.prior, *map(softmax, looks), restored]
+        evidence = [work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]
         fused = classification.fuse(evidence, self._parameters["fusion_weights"])
         measured_along = work.points_vessel[: len(work.contact.points_level), 0]  # they come first
         work.probabilities = classification.rule_out_too_long(fused, float(np.ptp(measured_along)), self._longest)

@@ -164,10 +164,9 @@ class _Best(_StageTable):
     looks: Annotated[int, Field(ge=1, le=10)]
     heading_std_scale: _Positive
     heading_std_power: _Positive = 1.0
-    bow_weights: Annotated[list[_Finite], Field(min_length=2, max_length=2)]  # look, points
-    fusion_weights: Annotated[
-        list[_Finite], Field(min_length=5, max_length=5)
-    ]  # prior, look, points, bottleneck, restored
+    bow_weights: Annotated[list[_Finite], Field(min_length=2, max_length=2)]  # aligned looks, first look
+    # prior, aligned looks, bottleneck, restored cloud
+    fusion_weights: Annotated[list[_Finite], Field(min_length=4, max_length=4)]
 
 
 class _Reasons(_StageTable):

@@ -11,6 +11,7 @@ from shipshape.stages import (
     inpainting,
     keypoints,
     lifting,
+    prior,
     projection,
     spd2,
 )
@@ -28,6 +29,13 @@ class PaperMethod:
         self._longest = max(box.length for box in self._boxes)
         self._parameters = bundle.parameters["paper"]
         self._spd2_radius = bundle.parameters["common"]["spd2_radius"]
+        self._prior_temperature = bundle.parameters["common"]["prior_temperature"]
+
+    def prior(self, work: Work) -> None:
+        """Mean confidence of the SPD2 images of the densest points, in the sight frame."""
+        densest = keypoints.select_keypoints(work.points_sight, KeypointParams())
+        images = spd2.describe(work.points_sight, densest, self._spd2_radius)
+        work.prior = prior.estimate_prior(images, self._models["prior"], temperature=self._prior_temperature)
 
     def heading(self, work: Work) -> None:
         """Best IoU with the reference box of the prior's class, laid against the visible faces."""

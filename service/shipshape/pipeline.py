@@ -17,7 +17,7 @@ from shipshape.best import BestMethod
 from shipshape.bundle import UNKNOWN, Bundle, check_fit
 from shipshape.paper import PaperMethod
 from shipshape.reasons import measure, reasons_of
-from shipshape.stages import keypoints, prior, spd2
+from shipshape.stages import keypoints, spd2
 from shipshape.stages.keypoints import KeypointParams
 from shipshape.types import Box, Contact, ImagePair, Options, Preset, Recognition
 from shipshape.validation import ContactLimits, check_contact
@@ -51,7 +51,7 @@ class Pipeline:
         self._common = bundle.parameters["common"]
         self._thresholds = bundle.parameters.get("reasons", {})
         self.stages = (
-            Stage("prior", self._prior),
+            Stage("prior", lambda work: self._method(work).prior(work)),
             Stage("heading", lambda work: self._method(work).heading(work)),
             Stage("bow_stern", lambda work: self._method(work).bow_stern(work)),
             Stage("projection", lambda work: self._method(work).projection(work)),
@@ -122,13 +122,6 @@ class Pipeline:
     def _is_unknown(self, work: Work) -> bool:
         *known, unknown = work.probabilities
         return bool(unknown > min(max(known), self._common["unknown_above"]))
-
-    def _prior(self, work: Work) -> None:
-        densest = keypoints.select_keypoints(work.points_sight, KeypointParams())
-        images = spd2.describe(work.points_sight, densest, self._common["spd2_radius"])
-        work.prior = prior.estimate_prior(
-            images, self.bundle.models["prior"], temperature=self._common["prior_temperature"]
-        )
 
     def _keypoints(self, work: Work) -> None:
         work.points_vessel = work.pose.to_vessel(work.restored.points_level)

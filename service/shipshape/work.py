@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from shipshape.alignment import Look, PointsLook
+from shipshape.alignment import Look
+from shipshape.first_look import FirstLook
 from shipshape.raster import FilledLayers, ImageFrame, Layers
 from shipshape.sight import SightFrame
 from shipshape.types import Contact, Options, Pose, RestoredCloud
@@ -20,10 +21,10 @@ class Work:
     sight: SightFrame
     points_sight: Float32[np.ndarray, "n 3"]
 
+    first: FirstLook = field(init=False)  # preset best: the look along the line of sight
     prior: Float32[np.ndarray, " classes"] = field(init=False)  # of the raw cluster; the last is "unknown"
     pose: Pose = field(init=False)  # after heading: modulo pi; after bow_stern: settled
     look: Look = field(init=False)  # preset best: the aligned looks
-    points_look: PointsLook = field(init=False)  # preset best: the look at the aligned points
     heading_std: float = field(init=False)  # rad
     bow_probability: float = field(init=False)
     frame: ImageFrame = field(init=False)

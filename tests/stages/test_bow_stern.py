@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from builders import ANGLES, BOAT, FakeModel, constant, heading_error_deg, properties
-from shipshape.alignment import Look, PointsLook
+from shipshape.alignment import Look
+from shipshape.first_look import FirstLook
 from shipshape.stages import bow_stern
 from shipshape.types import Pose
 
@@ -89,8 +90,12 @@ def test_the_looks_say_together_whether_to_turn_round(image: float, points: floa
     assert probability == pytest.approx(1 / (1 + math.exp(-abs(0.5 * image + 0.25 * points))))
 
 
-def looks(pose: Pose, image: float, points: float) -> tuple[Look, PointsLook]:
-    return Look(pose, 0.1, image, np.zeros(4, np.float32)), PointsLook(points, np.zeros(4, np.float32))
+def looks(pose: Pose, image: float, points: float) -> tuple[Look, FirstLook]:
+    """The bow that the first look saw lies aside of the axis: only its share along the axis counts."""
+    back = np.array([math.cos(pose.heading), math.sin(pose.heading)]) * -points / 2
+    aside = np.array([-math.sin(pose.heading), math.cos(pose.heading)])
+    nothing = np.zeros(4, np.float32)
+    return Look(pose, 0.1, image, nothing), FirstLook(pose, tuple((back + aside).tolist()), nothing)
 
 
 @properties()

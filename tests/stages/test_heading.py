@@ -23,7 +23,6 @@ from builders import (
 )
 from shipshape import frames
 from shipshape.alignment import look
-from shipshape.sight import SightFrame
 from shipshape.stages import heading
 from shipshape.types import Pose, ReferenceBox
 
@@ -156,35 +155,6 @@ def test_a_cluster_longer_than_the_box_is_centred_in_it() -> None:
 
     np.testing.assert_allclose(laid.origin_level, (*pose.origin_level[:2], -2.0), atol=0.01)
     assert laid.size is BOAT
-
-
-@properties(50)
-@given(ANGLES, ANGLES, ANGLES)
-def test_the_first_pose_is_told_along_the_line_of_sight(bearing: float, axis: float, gaze: float) -> None:
-    points = np.array([[-4.0, -2.0, 0.0], [4.0, 2.0, 1.0], [0.0, 0.0, 2.0]], np.float32)  # half extent 4.2 m
-    network = constant([[math.sin(2 * axis), math.cos(2 * axis)]], [[0.5, -0.25]], [np.log([12.0, 4.0, 3.0])])
-
-    pose = heading.first_pose(points, SightFrame(bearing, (30.0, 20.0, -3.0), False), network)
-
-    right = np.exp(1j * bearing)
-    moved = complex(30.0, 20.0) + 4.2 * (0.5 * right - 0.25 * right * 1j)
-    assert axis_error_deg(pose.heading, bearing + axis) < 1e-3
-    np.testing.assert_allclose(pose.origin_level, (moved.real, moved.imag, -3.0), atol=1e-4)
-    np.testing.assert_allclose((pose.size.length, pose.size.beam, pose.size.height), (12, 4, 3), rtol=1e-5)
-
-
-def test_the_sight_image_shows_left_up_and_far_right() -> None:
-    points = np.array([[5.0, 5.0, 2.5], [5.0, 4.99, 2.0], [-5.0, -5.0, 0.0]], np.float32)
-
-    seen = heading.sight_image(points, SightFrame(0.0, (30.0, 40.0, -3.0), True))
-
-    assert seen.half_extent == pytest.approx(5.25)
-    lit = np.argwhere(seen.planes[0])
-    assert len(lit) == 2
-    (row_far, column_far), (row_near, column_near) = lit
-    assert (row_far < 5, column_far > 58, row_near > 58, column_near < 5) == (True, True, True, True)
-    np.testing.assert_allclose(seen.planes[:, row_far, column_far], [math.log(3) / 3, 0.25, 0.2], atol=1e-6)
-    np.testing.assert_allclose(seen.features, [math.log(5.25), math.log(50), math.log(3), 1], rtol=1e-6)
 
 
 def test_looks_follow_one_another() -> None:

@@ -74,9 +74,9 @@ class Panel:
         try:
             if left & {BEST, RAW, *self._methods}:
                 runs = run_systems(self.pipeline, contact, self._methods)
+                _write_probabilities(runs.pop(RAW).work.prior, answers, (rows[RAW], column))
                 for name, run in runs.items():
                     self._write(run, answers, (rows[name], column))
-                _write_probabilities(runs[BEST].work.prior, answers, (rows[RAW], column))
             else:
                 self.pipeline.begin(contact, Options())
         except InvalidInput:

@@ -51,7 +51,7 @@ def answer(pipeline: Pipeline, complete: dict[str, OnnxModel], points_level: np.
     """Most probable vessel by each of TRAINED_ON and SYSTEMS, (2, 5); REFUSED where the service refuses."""
     answers = np.full((len(TRAINED_ON), len(SYSTEMS)), REFUSED, np.int8)
     try:
-        raw = Run(pipeline.begin(Contact(points_level), Options())).through(pipeline, ("prior",))
+        raw = Run(pipeline.begin(Contact(points_level), Options(Preset.PAPER))).through(pipeline, ("prior",))
     except InvalidInput:
         return answers
     answers[1, 0] = np.argmax(raw.work.prior[:-1])

@@ -49,11 +49,11 @@ def headings(pipeline: Pipeline, contact: Contact, box: ReferenceBox) -> list[fl
         box: of the vessel's true type, told to `area_projection_told` alone.
     """
     try:
-        raw = Run(pipeline.begin(contact, Options())).through(pipeline, ("prior",))
+        begun = Run(pipeline.begin(contact, Options()))
     except InvalidInput:
         return [np.nan] * len(METHODS)
-    pose = ("heading", "bow_stern")
-    paper, best = (raw.branch(Options(preset)).through(pipeline, pose).work.pose for preset in Preset)
+    pose = ("prior", "heading", "bow_stern")
+    paper, best = (begun.branch(Options(preset)).through(pipeline, pose).work.pose for preset in Preset)
     points = contact.points_level
     told = heading.by_area_projection(points, box)
     free = (by_min_area(points), by_principal_axis(points), by_l_shape(points))

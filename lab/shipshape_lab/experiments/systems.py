@@ -1,7 +1,7 @@
 """The systems that are compared, on the same contacts; those of the pipeline are run by the service's own stages.
 
 `best` is the shipped default; `full_top`, `full_side`, `z_top` and `z_side` are preset `paper` with each of its
-image methods; `raw_spd2` is the classifier of the raw cluster, which the pipeline calls the prior. The peers are
+image methods; `raw_spd2` is the classifier of the raw cluster, which is the prior of preset `paper`. The peers are
 what a user might take instead, trained on the same clusters: `pointnet`, `pointnet2` and `mirrored_spd2`.
 """
 
@@ -51,14 +51,18 @@ class Run:
 
 
 def run_systems(pipeline: Pipeline, contact: Contact, methods: Sequence[str] = IMAGE_METHODS) -> dict[str, Run]:
-    """`best` and preset `paper` with each of `methods` on one contact; what they share is computed once.
+    """RAW as far as its answer, `best`, and preset `paper` with each of `methods` on one contact.
+
+    What they share is computed once.
 
     Raises:
         InvalidInput: the contact cannot be one vessel's cluster.
     """
-    raw = Run(pipeline.begin(contact, Options())).through(pipeline, _PRIOR)
+    started = Run(pipeline.begin(contact, Options()))
+    raw = started.branch(Options(Preset.PAPER)).through(pipeline, _PRIOR)
     rest = [stage.name for stage in pipeline.stages if stage.name not in (*_PRIOR, *_POSE)]
-    runs = {BEST: raw.branch(Options(Preset.BEST)).through(pipeline, (*_POSE, *rest))}
+    best = started.branch(Options(Preset.BEST)).through(pipeline, (*_PRIOR, *_POSE, *rest))
+    runs = {RAW: raw, BEST: best}
     if methods:
         paper = raw.branch(Options(Preset.PAPER)).through(pipeline, _POSE)
         for method in map(ImageMethod, methods):

@@ -42,7 +42,6 @@ QUICK = Plan(
     validation=1_500,
     hulls=20,
     epochs={
-        "sight": 2,
         "aligned": 8,
         "points": 6,
         "inpainting": 5,

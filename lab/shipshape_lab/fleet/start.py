@@ -21,9 +21,9 @@ from torch.utils.data import default_collate
 from shipshape import raster
 from shipshape.types import ImageMethod
 from shipshape_lab.fleet.plan import PLANS
-from shipshape_lab.training import loop, train_aligned, train_grey, train_inpainting, train_points, train_sight
+from shipshape_lab.training import loop, train_aligned, train_grey, train_inpainting, train_points
 from shipshape_lab.training.examples import Example, Examples
-from shipshape_lab.training.nets import AlignedNet, GreyNet, InpaintingNet, PointsNet, SightNet
+from shipshape_lab.training.nets import AlignedNet, GreyNet, InpaintingNet, PointsNet
 
 ITEMS = 256  # examples that the batch norms are set on
 NEW_HEADS = ("classes", "classify")
@@ -124,9 +124,8 @@ def starts(examples: Examples) -> dict[str, tuple[nn.Module, Callable[[Example, 
     classes = len(examples.catalogue) + 1
     edges = raster.aligned_frame(1.0).edges
     found = {
-        "sight": (SightNet(), lambda e, rng: train_sight.to_item(e)),
         "aligned": (AlignedNet(classes), lambda e, rng: train_aligned.to_item(e, train_aligned.guess(e, rng))),
-        "points": (PointsNet(classes), lambda e, rng: train_points.to_item(e, train_points.guess(e, rng), rng)),
+        "points": (PointsNet(classes), lambda e, rng: train_points.to_item(e)),
         "inpainting": (
             InpaintingNet(classes, edges),
             lambda e, rng: train_inpainting.to_item(e, train_inpainting.guess(e, rng)),
@@ -155,7 +154,7 @@ def main(argv: list[str] | None = None) -> None:
         rng = np.random.default_rng(0)
         chosen = rng.choice(own.indices, min(ITEMS, len(own)), replace=False)
         batch = default_collate([to_item(own.drawn(int(i), rng), rng) for i in chosen])
-        inputs = [batch[key] for key in ("planes", "points", "features", "image") if key in batch]
+        inputs = [batch[key] for key in ("planes", *train_points.INPUTS, "image") if key in batch]
         take_up(net, layers_of(args.bundle / f"{name}.onnx"), inputs)
         schedule = loop.Schedule(PLANS[args.plan].epochs_of(name), rate=RATE)
         data = loop.Drawn(own.indices, lambda i, rng: {}, schedule.seed)

@@ -13,7 +13,6 @@ SECONDS = {
     "validation": (200, 80),
     "start": (0, 20),
     "inpainting": (2000, 300),
-    "sight": (700, 90),
     "aligned": (900, 180),
     "points": (1300, 200),
     "inpainting_": (300, 50),
@@ -24,7 +23,7 @@ SECONDS = {
     "bundle": (150, 80),
     "evaluation": (150, 150),
 }
-NEEDS = {"spd2": ("inpainting", "sight", "aligned", "points")}
+NEEDS = {"spd2": ("inpainting", "aligned", "points")}
 for _method in ImageMethod:
     NEEDS[f"spd2_{_method}"] = (f"inpainting_{_method}", "prior", "parts")
 

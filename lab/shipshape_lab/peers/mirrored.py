@@ -18,8 +18,8 @@ from shipshape_lab.training.examples import Example
 from shipshape_lab.training.partial import partial_bundle
 from shipshape_lab.training.train_spd2 import Described, describe_densest
 
-POSE_NETWORKS = ("sight.onnx", "aligned.onnx", "points.onnx")
-_POSE_STAGES = ("heading", "bow_stern")
+POSE_NETWORKS = ("points.onnx", "aligned.onnx")
+_POSE_STAGES = ("prior", "heading", "bow_stern")
 _TO_OTHER_SIDE = np.array([1.0, -1.0, 1.0], np.float32)
 
 

@@ -9,7 +9,7 @@ examples drawn afresh every epoch (mirrored or not, thinned or not, sensor heigh
 0.02. On 40,000 clusters that is 8 epochs or 320,000 examples for pointnet, 7 or 280,000 for pointnet2; the
 networks of `best` see 240,000 to 280,000. mirrored_spd2 is trained as the classifier of restored clouds is: 8
 keypoints a cluster described once, 4 epochs, batches of 256. It needs the trained pose of preset `best`, from any
-folder with sight.onnx, aligned.onnx and points.onnx.
+folder with points.onnx and aligned.onnx.
 
 Stopped and started again, training goes on after the last whole epoch.
 """

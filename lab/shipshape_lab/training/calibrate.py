@@ -37,7 +37,7 @@ class BestEvidence:
 
     turn_error: float  # rad, modulo pi
     heading_std: float  # rad, as the network says it
-    flip_logits: np.ndarray  # (2,): of the aligned looks and of the points
+    flip_logits: np.ndarray  # (2,): of the aligned looks and of the first look
     flipped: bool  # whether the bow truly pointed the other way
     witnesses: np.ndarray  # (4, classes) probabilities in the order that fusion weighs them
     label: int
@@ -143,11 +143,11 @@ def _empty_below(pipeline: Pipeline, catalogue: list[Example]) -> float:
 def _best_evidence(pipeline: Pipeline, example: Example) -> BestEvidence:
     work = run_until(pipeline, example.contact, Options(Preset.BEST), "spd2")
     restored = classification.mean_confidence(work.images, pipeline.bundle.models["spd2"])
-    looks = (work.look.class_logits, work.points_look.class_logits, work.bottleneck)
+    looks = (work.look.class_logits, work.bottleneck)
     return BestEvidence(
         turn_error=frames.wrap_half_turn(work.look.pose.heading - example.pose.heading),
         heading_std=work.look.heading_std,
-        flip_logits=np.array([work.look.flip_logit, work.points_look.flip_logit]),
+        flip_logits=np.array([work.look.flip_logit, work.first.flip_logit(work.look.pose)]),
         flipped=math.cos(work.look.pose.heading - example.pose.heading) < 0,
         witnesses=np.stack([work.prior, *map(softmax, looks), restored]),
         label=example.label,

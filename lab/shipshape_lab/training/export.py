@@ -58,7 +58,7 @@ def prove_equal(net: nn.Module, inputs: dict[str, Tensor], path: Path) -> float:
     worst = 0.0
     generator = torch.Generator().manual_seed(0)
     for batch in (1, 3):
-        random = {name: torch.rand((batch, *x.shape[1:]), generator=generator) for name, x in inputs.items()}
+        random = {name: _alike(x, batch, generator) for name, x in inputs.items()}
         with torch.no_grad():
             wanted = net(*random.values())
         wanted = wanted if isinstance(wanted, tuple) else (wanted,)
@@ -69,3 +69,11 @@ def prove_equal(net: nn.Module, inputs: dict[str, Tensor], path: Path) -> float:
     if worst > TOLERANCE:
         raise ValueError(f"expected ONNX to equal torch within {TOLERANCE}, got a difference of {worst:.2g}")
     return worst
+
+
+def _alike(example: Tensor, batch: int, generator: torch.Generator) -> Tensor:
+    """Random values, or random choices among those of an example that counts something."""
+    shape = (batch, *example.shape[1:])
+    if example.is_floating_point():
+        return torch.rand(shape, generator=generator)
+    return torch.randint(int(example.max()) + 1, shape, generator=generator)

@@ -36,20 +36,6 @@ class _Encoder(nn.Module):
         return self.mix(torch.cat([self.image(planes).flatten(1), features], dim=1))
 
 
-class SightNet(nn.Module):
-    """The cluster along the line of sight -> (sin 2a, cos 2a), shift of the middle, log size."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.encode = _Encoder(3, (64, 64), 4)
-        self.axis, self.shift, self.size = nn.Linear(192, 2), nn.Linear(192, 2), nn.Linear(192, 3)
-
-    def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
-        """Image and features to the outputs named above, in that order."""
-        seen = self.encode(planes, features)
-        return self.axis(seen), self.shift(seen), self.size(seen) + 2.0
-
-
 class AlignedNet(nn.Module):
     """The roughly aligned cluster -> turn and log of its spread, flip logit, shift, log size, class logits."""
 
@@ -77,28 +63,41 @@ def _pointwise(channels_in: int, channels_out: int) -> nn.Sequential:
 
 
 class PointsNet(nn.Module):
-    """Points in the vessel frame -> flip logit, class logits: a PointNet whose points hear of the whole once.
+    """The first look (`shipshape.first_look`): groups of points along the line of sight -> what they are part of.
 
-    The greatest of each feature over all points says what is there; joined to every point, it lets the second
-    round judge a point by its place in the whole (as the encoder of PCN does).
+    Two rounds of PointNet++ and one network over all that is left; every round ends in the greatest of each
+    feature, so that an element that comes twice changes nothing.
     """
 
-    def __init__(self, classes: int, planes: int = 6, features: int = 5) -> None:
+    def __init__(self, classes: int) -> None:
         super().__init__()
-        self.first = nn.Sequential(_pointwise(planes, 64), _pointwise(64, 96))
-        self.second = nn.Sequential(_pointwise(192, 192), _pointwise(192, 256))
+        self.near = nn.Sequential(_pointwise(6, 48), _pointwise(48, 48), _pointwise(48, 96))
+        self.far = nn.Sequential(_pointwise(3 + 96, 96), _pointwise(96, 96), _pointwise(96, 192))
+        self.rest = nn.Sequential(_pointwise(3 + 192, 192), _pointwise(192, 512))
         self.mix = nn.Sequential(
-            nn.Linear(256 + features, 192), nn.ReLU(inplace=True), nn.Dropout(0.2), nn.Linear(192, 96), nn.ReLU()
+            nn.Linear(512 + 3, 256), nn.ReLU(), nn.Dropout(0.2), nn.Linear(256, 192), nn.ReLU(), nn.Dropout(0.1)
         )
-        self.flip, self.classes = nn.Linear(96, 1), nn.Linear(96, classes)
+        self.axis, self.shift, self.size = nn.Linear(192, 2), nn.Linear(192, 2), nn.Linear(192, 3)
+        self.bow, self.classes = nn.Linear(192, 2), nn.Linear(192, classes)
 
-    def forward(self, points: Tensor, features: Tensor) -> tuple[Tensor, Tensor]:
-        """Points (n, 6, 1, k) and features (n, 5) to the outputs named above, in that order."""
-        own = self.first(points)
-        whole = own.amax(dim=3, keepdim=True).expand_as(own)
-        seen = self.second(torch.cat([own, whole], dim=1)).amax(dim=(2, 3))
-        seen = self.mix(torch.cat([seen, features], dim=1))
-        return self.flip(seen), self.classes(seen)
+    def forward(
+        self, near: Tensor, members: Tensor, far: Tensor, centres: Tensor, features: Tensor
+    ) -> tuple[Tensor, ...]:
+        """Inputs of `first_look.network_inputs` in batches of n.
+
+        Returns:
+            (n, 2) sine and cosine of the doubled angle of the axis; (n, 2) shift of the middle in units of 10 m;
+            (n, 3) log size; (n, 2) half the log-odds that the bow points along x, along y; (n, classes) logits.
+        """
+        groups = self.near(near).amax(dim=3).transpose(1, 2)
+        n, most, _ = groups.shape
+        rows = members + most * torch.arange(n, device=members.device)[:, None]
+        # Whole rows: to gather along the last axis takes ten times as long.
+        known = groups.flatten(0, 1)[rows.flatten()].reshape(n, -1, far.shape[3], 96).permute(0, 3, 1, 2)
+        known = self.far(torch.cat([far, known], dim=1)).amax(dim=3, keepdim=True)
+        whole = self.rest(torch.cat([centres, known], dim=1)).amax(dim=(2, 3))
+        seen = self.mix(torch.cat([whole, features], dim=1))
+        return self.axis(seen), self.shift(seen), self.size(seen) + 2.0, self.bow(seen), self.classes(seen)
 
 
 class UNet(nn.Module):
@@ -144,16 +143,31 @@ class UNet(nn.Module):
 class InpaintingNet(nn.Module):
     """Aligned planes and their mirror -> occupancy, top, bottom, sub-cell offset of each layer; class logits.
 
-    Heights are bounded by their layer (`edges`, shares of the depth range), bottoms by their top.
+    A U-Net at half the image's size, which tells four cells at each place: what was measured is laid over its
+    answer in full size anyway. Heights are bounded by their layer (`edges`, shares of the depth range), bottoms by
+    their top.
     """
 
-    def __init__(self, classes: int, edges: tuple[float, ...], width: int = 16) -> None:
+    def __init__(
+        self, classes: int, edges: tuple[float, ...], widths: tuple[int, int, int] = (32, 64, 128)
+    ) -> None:
         super().__init__()
-        self.unet = UNet(18, width)
-        self.inject = nn.Linear(3, 8 * width)
-        self.head = nn.Conv2d(width, 15, 1)
+        near, middle, far = widths
+        self.down = nn.ModuleList(
+            [
+                nn.Sequential(_conv(18, near, 2), _conv(near, near)),
+                nn.Sequential(_conv(near, middle, 2), _conv(middle, middle)),
+                nn.Sequential(_conv(middle, far, 2), _conv(far, far), _conv(far, far)),
+            ]
+        )
+        self.inject = nn.Linear(3, far)
+        self.rise = nn.ModuleList([nn.Conv2d(far, middle, 1), nn.Conv2d(middle, near, 1)])
+        self.up = nn.ModuleList(
+            [nn.Sequential(_conv(width, width), _conv(width, width)) for width in (middle, near)]
+        )
+        self.head = nn.Conv2d(near, 4 * 15, 1)
         self.classify = nn.Sequential(
-            nn.Conv2d(8 * width, 32, 1), nn.ReLU(), nn.Flatten(), nn.Dropout(0.2), nn.Linear(32 * 4 * 8, classes)
+            nn.Conv2d(far, 32, 1), nn.ReLU(), nn.Flatten(), nn.Dropout(0.2), nn.Linear(32 * 4 * 8, classes)
         )
         lower = torch.tensor(edges[:-1], dtype=torch.float32).view(1, -1, 1, 1)
         upper = torch.tensor(edges[1:], dtype=torch.float32).view(1, -1, 1, 1)
@@ -162,9 +176,13 @@ class InpaintingNet(nn.Module):
 
     def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
         """Image and features to the outputs named above, in that order."""
-        levels = self.unet.encode(planes)
-        bottleneck = levels[-1] + self.inject(features)[:, :, None, None]
-        out = self.head(self.unet.decode(levels, bottleneck))
+        levels = [planes]
+        for block in self.down:
+            levels.append(block(levels[-1]))
+        bottleneck = image = levels[-1] + self.inject(features)[:, :, None, None]
+        for rise, up, skipped in zip(self.rise, self.up, (levels[2], levels[1]), strict=True):
+            image = up(nn.functional.interpolate(rise(image), scale_factor=2.0, mode="nearest") + skipped)
+        out = nn.functional.pixel_shuffle(self.head(image), 2)
         top = torch.sigmoid(out[:, 3:6])
         bottom = top * torch.sigmoid(out[:, 6:9])
         return (

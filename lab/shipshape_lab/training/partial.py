@@ -20,7 +20,7 @@ UNCALIBRATED = {
         "looks": 2,
         "heading_std_scale": 1.0,
         "bow_weights": [0.5, 0.5],
-        "fusion_weights": [0.2, 0.2, 0.2, 0.2, 0.2],
+        "fusion_weights": [0.25, 0.25, 0.25, 0.25],
     },
 }
 

@@ -16,7 +16,7 @@ from onnxruntime.quantization import CalibrationDataReader, QuantType, quant_pre
 
 from shipshape.pipeline import Pipeline
 from shipshape.types import Options
-from shipshape_lab.training import train_aligned, train_inpainting, train_points, train_sight, train_spd2
+from shipshape_lab.training import train_aligned, train_inpainting, train_points, train_spd2
 from shipshape_lab.training.examples import Example, Examples, is_accepted
 from shipshape_lab.training.partial import partial_bundle
 
@@ -43,14 +43,11 @@ def quantise_all(networks: Path, to: Path, training: Examples, *, seed: int) -> 
 
 def _makers(pipeline: Pipeline) -> dict[str, Make]:
     return {
-        "sight": lambda example, rng: _planes(train_sight.to_item(example)),
         "aligned": lambda example, rng: _planes(train_aligned.to_item(example, train_aligned.guess(example, rng))),
         "inpainting": lambda example, rng: _planes(
             train_inpainting.to_item(example, train_inpainting.guess(example, rng))
         ),
-        "points": lambda example, rng: _points(
-            train_points.to_item(example, train_points.guess(example, rng), rng)
-        ),
+        "points": lambda example, rng: _points(train_points.to_item(example)),
         "prior": partial(_densest, train_spd2.of_prior(pipeline)),
         "spd2": partial(_densest, train_spd2.of_restored(pipeline, Options())),
     }
@@ -61,7 +58,7 @@ def _planes(item: dict) -> dict[str, np.ndarray]:
 
 
 def _points(item: dict) -> dict[str, np.ndarray]:
-    return {name: item[name] for name in ("points", "features")}
+    return {name: item[name] for name in train_points.INPUTS}
 
 
 def _densest(describe: Callable, example: Example, rng: np.random.Generator) -> dict[str, np.ndarray]:

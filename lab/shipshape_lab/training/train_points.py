@@ -1,4 +1,4 @@
-"""Train the look at the points themselves in the aligned frame: bow or stern, and the class.
+"""Train the first look at the points along the line of sight: class, heading, bow, middle and size at once.
 
 python -m shipshape_lab.training.train_points --data runs/data --out runs/default
 """
@@ -10,43 +10,61 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from shipshape import alignment, frames
-from shipshape.types import Pose
+from shipshape import first_look, frames, sight
 from shipshape_lab.training import arguments, export, loop
 from shipshape_lab.training.examples import Example, Examples
 from shipshape_lab.training.nets import PointsNet
-from shipshape_lab.training.poses import disturbed
 
-EPOCHS = 7
-POINTS = 256  # of every example, so that they fill a batch; the network itself takes any number
-WIDE = 0.2  # share of poses as wrong as those of the first look
+EPOCHS = 8
+INPUTS = ("near", "members", "far", "centres", "features")
 
 
-def guess(example: Example, rng: np.random.Generator) -> Pose:
-    """A pose as the aligned looks may leave it, and in half of the cases with bow and stern swapped."""
-    pose = disturbed(example.pose, rng, wide=rng.random() < WIDE)
-    return pose.turned(math.pi) if rng.random() < 0.5 else pose
-
-
-def to_item(example: Example, pose: Pose, rng: np.random.Generator) -> dict:
-    """The network's inputs and targets for one example seen in the frame of `pose`."""
+def to_item(example: Example) -> dict:
+    """The network's inputs, filled up to a fixed size, and its targets for one example."""
     points = example.contact.points_level
-    planes, features = alignment.point_inputs(rng.permutation(points), pose)
-    filled = np.arange(POINTS) % planes.shape[2]  # repeated points change no maximum
+    frame = sight.sight_frame(example.contact)
+    turned = example.pose.heading - frame.bearing
+    rotation = frames.R_level_vessel(frame.bearing)
+    step = np.subtract(example.pose.origin_level[:2], frame.origin_level[:2]) @ rotation
+    size = example.pose.size
     return {
-        "points": planes[:, :, filled],
-        "features": features,
-        "flip": np.float32(abs(frames.wrap_angle(example.pose.heading - pose.heading)) > math.pi / 2),
+        **filled(first_look.network_inputs(sight.to_sight(points, frame), frame)),
+        "heading": np.array([math.cos(turned), math.sin(turned)], np.float32),
+        "step": (step / first_look.UNIT).astype(np.float32),
+        "size": np.log([size.length, size.beam, size.height]).astype(np.float32),
         "label": example.label,
     }
 
 
+def filled(inputs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Groups repeated until there are as many as at most: batches are of one shape, and no maximum changes."""
+    groups, wholes = (np.arange(most) for most in first_look.CENTRES)
+    members = inputs["members"].reshape(-1, first_look.NEIGHBOURS)
+    wholes = wholes % len(members)
+    return {
+        "near": inputs["near"][:, groups % inputs["near"].shape[1]],
+        "members": members[wholes].reshape(-1),
+        "far": inputs["far"][:, wholes],
+        "centres": inputs["centres"][:, wholes],
+        "features": inputs["features"],
+    }
+
+
 def loss_of(net: nn.Module, batch: dict[str, Tensor]) -> Tensor:
-    """Cross-entropies of bow and class."""
-    flip, classes = (out.float() for out in net(batch["points"], batch["features"]))
-    return 0.5 * nn.functional.binary_cross_entropy_with_logits(
-        flip[:, 0], batch["flip"]
-    ) + nn.functional.cross_entropy(classes, batch["label"], label_smoothing=0.02)
+    """Class, the doubled angle as a vector, bow along the true axis, middle in lengths, log size."""
+    axis, shift, size, bow, classes = (out.float() for out in net(*(batch[name] for name in INPUTS)))
+    cosine, sine = batch["heading"].T
+    doubled = torch.stack([2 * sine * cosine, cosine**2 - sine**2], dim=1)
+    ahead = 2 * (bow * batch["heading"]).sum(dim=1)
+    lengths = batch["size"][:, :1].exp() / first_look.UNIT
+    robust = nn.functional.smooth_l1_loss
+    return (
+        nn.functional.cross_entropy(classes, batch["label"], label_smoothing=0.02)
+        + nn.functional.mse_loss(axis, doubled)
+        + 0.3 * nn.functional.softplus(-ahead).mean()
+        + robust(shift / lengths, batch["step"] / lengths, beta=0.05)
+        + 0.5 * robust(size, batch["size"], beta=0.05)
+    )
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -54,12 +72,8 @@ def main(argv: list[str] | None = None) -> None:
     args = arguments.parse(__doc__, argv, epochs=EPOCHS)
     examples = Examples.read(args.data, "train")
 
-    def draw(i: int, rng: np.random.Generator) -> dict:
-        example = examples.drawn(i, rng)
-        return to_item(example, guess(example, rng), rng)
-
     def draws(seed: int) -> loop.Drawn:
-        return loop.Drawn(examples.indices, draw, seed)
+        return loop.Drawn(examples.indices, lambda i, rng: to_item(examples.drawn(i, rng)), seed)
 
     torch.manual_seed(args.seed)
     net = PointsNet(len(examples.catalogue) + 1)
@@ -70,8 +84,17 @@ def main(argv: list[str] | None = None) -> None:
 
 def write(net: nn.Module, folder: Path) -> None:
     """Export to points.onnx."""
-    inputs = {"points": torch.rand(1, 6, 1, 300), "features": torch.rand(1, 5)}
-    export.export(net, inputs, ["flip", "classes"], folder / "points.onnx", free={"points": {3: "points"}})
+    groups, wholes = (most - 1 for most in first_look.CENTRES)  # any number; most make the bounds of `members`
+    k = first_look.NEIGHBOURS
+    inputs = {
+        "near": torch.rand(1, 6, groups, k),
+        "members": torch.arange(wholes * k)[None] % groups,
+        "far": torch.rand(1, 3, wholes, k),
+        "centres": torch.rand(1, 3, wholes, 1),
+        "features": torch.rand(1, 3),
+    }
+    free = {"near": {2: "groups"}, "members": {1: "members"}, "far": {2: "wholes"}, "centres": {2: "wholes"}}
+    export.export(net, inputs, ["axis", "shift", "size", "bow", "classes"], folder / "points.onnx", free=free)
 
 
 if __name__ == "__main__":

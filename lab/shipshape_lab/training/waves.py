@@ -5,9 +5,8 @@ from shipshape.types import ImageMethod
 # Each wave needs the networks of the waves before it; the longest come first, so that the lanes end together.
 WAVES = (
     (
-        ("inpainting",),
-        ("sight",),
         ("points",),
+        ("inpainting",),
         ("aligned",),
         *(("grey", "--method", method) for method in ImageMethod),
         ("spd2", "--model", "prior"),

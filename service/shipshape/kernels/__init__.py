@@ -5,6 +5,7 @@ it before the service is ready. Arrays are contiguous: a strided one would be co
 """
 
 from shipshape.kernels.clouds import Extent, extent
+from shipshape.kernels.groups import describe_groups, farthest_points, in_ball
 from shipshape.kernels.images import grey_levels, lift_columns, rasterise, stack_planes
 from shipshape.kernels.neighbours import count_neighbours, select_spread
 from shipshape.kernels.silhouette import silhouette
@@ -14,8 +15,11 @@ __all__ = [
     "Extent",
     "bin_spherically",
     "count_neighbours",
+    "describe_groups",
     "extent",
+    "farthest_points",
     "grey_levels",
+    "in_ball",
     "lift_columns",
     "rasterise",
     "select_spread",

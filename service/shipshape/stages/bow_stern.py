@@ -1,7 +1,7 @@
 """Bow or stern: which of the two opposite headings is right, with its probability; 0 and 180 are never averaged.
 
 `by_parts` is the paper's way (section 3.1.2): SPD2 images of keypoints are labelled bow, middle or stern part;
-`by_networks` asks the networks that look at the aligned image and at the aligned points.
+`by_networks` asks the networks that look at the points along the line of sight and at the aligned image.
 """
 
 import math
@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float32
 
-from shipshape.alignment import Look, PointsLook
+from shipshape.alignment import Look
+from shipshape.first_look import FirstLook
 from shipshape.onnx_model import OnnxModel
 from shipshape.softmax import softmax
 from shipshape.types import Pose
@@ -51,15 +52,15 @@ def by_parts(
     return _settle(pose, flip_logit=-sharpness * votes)
 
 
-def by_networks(found: Look, points: PointsLook, *, weights: Sequence[float]) -> tuple[Pose, float]:
-    """Pose with the bow the way both looks see it, and the calibrated probability of that.
+def by_networks(found: Look, first: FirstLook, *, weights: Sequence[float]) -> tuple[Pose, float]:
+    """Pose with the bow the way all looks see it, and the calibrated probability of that.
 
     Args:
         found: the aligned looks.
-        points: the look at the points in the pose that those left.
+        first: the look along the line of sight.
         weights: of the log-odds of either, fitted on validation.
     """
-    return _settle(found.pose, flip_logit=float(np.dot(weights, [found.flip_logit, points.flip_logit])))
+    return _settle(found.pose, flip_logit=float(np.dot(weights, [found.flip_logit, first.flip_logit(found.pose)])))
 
 
 def _settle(pose: Pose, *, flip_logit: float) -> tuple[Pose, float]:

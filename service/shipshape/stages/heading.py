@@ -1,20 +1,18 @@
 """Heading modulo pi: which way the vessel's long axis lies, before bow and stern are told apart.
 
-`by_area_projection` is the paper's search (section 3.1.1); `by_network` needs no class: one look along the line
-of sight for a coarse pose, then looks in the aligned frame that correct it.
+`by_area_projection` is the paper's search (section 3.1.1); `by_network` needs no class: looks in the aligned frame
+correct the coarse pose of the first look along the line of sight.
 """
 
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from jaxtyping import Float32
 
-from shipshape import frames, raster
+from shipshape import frames
 from shipshape.alignment import Look, look
 from shipshape.onnx_model import OnnxModel
-from shipshape.sight import SightFrame
 from shipshape.types import Pose, ReferenceBox
 
 _STEP_DEG = 0.6  # paper, section 3.1.1
@@ -62,50 +60,6 @@ def anchor_box(
     hidden = np.maximum(size - (upper - lower), 0.0)
     middle = rotation @ ((lower + upper) / 2 - toward_sensor * hidden / 2)
     return Pose(heading, (float(middle[0]), float(middle[1]), waterline), box)
-
-
-_SIGHT_PIXELS = 64
-_HEIGHT_UNIT = 10.0  # m; keeps heights of vessels near 1 for the network
-
-
-@dataclass(frozen=True, slots=True)
-class SightImage:
-    """What the sight network sees: the cluster from above, scaled to its own extent."""
-
-    planes: Float32[np.ndarray, "3 rows columns"]  # log count, top and bottom in units of 10 m
-    features: Float32[np.ndarray, " 4"]  # log half extent, log range, log points, whether the water is known
-    half_extent: float  # m
-
-
-def sight_image(points_sight: Float32[np.ndarray, "n 3"], sight: SightFrame) -> SightImage:
-    """The sight network's inputs for points in the sight frame."""
-    half = 1.05 * max(float(np.abs(points_sight[:, :2]).max()), 0.5)
-    frame = raster.ImageFrame(
-        axes=(0, 1, 2),
-        lower=(-half, -half, 0.0),
-        upper=(half, half, _HEIGHT_UNIT),
-        shape=(_SIGHT_PIXELS, _SIGHT_PIXELS),
-        edges=(0.0, 1.0),
-    )
-    layers = raster.rasterise(points_sight, frame)
-    planes = np.concatenate([np.log1p(layers.count).astype(np.float32) / 3, layers.top, layers.bottom])
-    features = [math.log(half), math.log(max(sight.range_m, 1.0)), math.log(len(points_sight))]
-    return SightImage(planes, np.array([*features, sight.knows_water], np.float32), half)
-
-
-def first_pose(points_sight: Float32[np.ndarray, "n 3"], sight: SightFrame, model: OnnxModel) -> Pose:
-    """A coarse pose from the look along the line of sight; its bow may point either way."""
-    seen = sight_image(points_sight, sight)
-    axis, shift, size = model.run(planes=seen.planes[None], features=seen.features[None])
-    heading = 0.5 * math.atan2(float(axis[0, 0]), float(axis[0, 1]))
-    step = frames.R_level_vessel(sight.bearing) @ (shift[0].astype(np.float64) * seen.half_extent)
-    x, y, z = sight.origin_level
-    length, beam, height = (float(side) for side in np.exp(size[0]))
-    return Pose(
-        frames.wrap_angle(sight.bearing + heading),
-        (x + float(step[0]), y + float(step[1]), z),
-        ReferenceBox(length, beam, height),
-    )
 
 
 def by_network(points_level: Float32[np.ndarray, "n 3"], pose: Pose, model: OnnxModel, *, looks: int) -> Look:

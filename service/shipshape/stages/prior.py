@@ -1,7 +1,7 @@
 """Prior: class probabilities of the raw cluster, before its heading is known (paper, section 3.1).
 
 The SPD2 images are taken in the sight frame. The prior gives the reference box that the paper's heading search
-needs, and is one of the witnesses that preset `best` fuses.
+needs. Preset `best` takes its prior from the first look at the points instead (`shipshape.first_look`).
 """
 
 import numpy as np
