@@ -3,6 +3,8 @@
 import torch
 from torch import Tensor, nn
 
+from shipshape.first_look import NEIGHBOURS
+
 
 def _conv(channels_in: int, channels_out: int, stride: int = 1) -> nn.Sequential:
     return nn.Sequential(
@@ -73,6 +75,8 @@ class PointsNet(nn.Module):
         super().__init__()
         self.near = nn.Sequential(_pointwise(6, 48), _pointwise(48, 48), _pointwise(48, 96))
         self.far = nn.Sequential(_pointwise(3 + 96, 96), _pointwise(96, 96), _pointwise(96, 192))
+        # A pool, not a maximum over a dimension: the quantiser knows it.
+        self.greatest = nn.MaxPool2d((1, NEIGHBOURS))
         self.rest = nn.Sequential(_pointwise(3 + 192, 192), _pointwise(192, 512))
         self.mix = nn.Sequential(
             nn.Linear(512 + 3, 256), nn.ReLU(), nn.Dropout(0.2), nn.Linear(256, 192), nn.ReLU(), nn.Dropout(0.1)
@@ -89,12 +93,12 @@ class PointsNet(nn.Module):
             (n, 2) sine and cosine of the doubled angle of the axis; (n, 2) shift of the middle in units of 10 m;
             (n, 3) log size; (n, 2) half the log-odds that the bow points along x, along y; (n, classes) logits.
         """
-        groups = self.near(near).amax(dim=3).transpose(1, 2)
+        groups = self.greatest(self.near(near)).squeeze(3).transpose(1, 2)
         n, most, _ = groups.shape
         rows = members + most * torch.arange(n, device=members.device)[:, None]
         # Whole rows: to gather along the last axis takes ten times as long.
-        known = groups.flatten(0, 1)[rows.flatten()].reshape(n, -1, far.shape[3], 96).permute(0, 3, 1, 2)
-        known = self.far(torch.cat([far, known], dim=1)).amax(dim=3, keepdim=True)
+        known = groups.flatten(0, 1)[rows.flatten()].reshape(n, -1, NEIGHBOURS, 96).permute(0, 3, 1, 2)
+        known = self.greatest(self.far(torch.cat([far, known], dim=1)))
         whole = self.rest(torch.cat([centres, known], dim=1)).amax(dim=(2, 3))
         seen = self.mix(torch.cat([whole, features], dim=1))
         return self.axis(seen), self.shift(seen), self.size(seen) + 2.0, self.bow(seen), self.classes(seen)

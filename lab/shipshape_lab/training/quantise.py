@@ -22,7 +22,7 @@ from shipshape_lab.training.partial import partial_bundle
 
 BATCH, BATCHES = 64, 16
 # Rectifiers are folded into the convolutions before them; what joins features of other scales stays float32.
-OPERATORS = ["Conv", "Relu"]
+OPERATORS = ["Conv", "Relu", "MaxPool"]
 RANGES = {"CalibMovingAverage": True, "CalibMovingAverageConstant": 0.05}
 
 Make = Callable[[Example, np.random.Generator], dict[str, np.ndarray]]

@@ -56,7 +56,7 @@ def describe_groups(
     members: Int64[np.ndarray, "c k"],
     scales: tuple[float, float],
 ) -> Float32[np.ndarray, "6 c k"]:
-    """Of each member its offset from the centre divided by the first scale, and its place divided by the second."""
+    """Of each member the offset from its centre divided by the first scale, and the place by the second."""
     planes = np.empty((6, *members.shape), np.float32)
     near, far = np.float32(1.0 / scales[0]), np.float32(1.0 / scales[1])
     for axis in range(3):
