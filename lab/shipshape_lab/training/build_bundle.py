@@ -31,6 +31,7 @@ def build(data: Path, networks: Path, to: Path, *, seed: int, name: str = "defau
     Raises:
         ValueError: the networks were trained for another catalogue than the validation set's.
     """
+    commit = code_commit()  # before anything is written: `to` may be part of the checkout
     validation = Examples.read(data, "validation")
     trained = load_catalogue(data / "train.npz")
     if not same_vessels(trained, validation.catalogue):
@@ -46,7 +47,7 @@ def build(data: Path, networks: Path, to: Path, *, seed: int, name: str = "defau
     return write_manifest(
         to,
         name=name,
-        training={"commit": code_commit(), "seed": seed, "validation_clusters": len(validation)},
+        training={"commit": commit, "seed": seed, "validation_clusters": len(validation)},
         catalogue=validation.catalogue,
         models={file.stem: Path(file.name) for file in files},
         parameters=parameters,
