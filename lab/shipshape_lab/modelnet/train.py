@@ -37,10 +37,10 @@ EMPTY_BELOW = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4)  # candidates
 class SquareInpaintingNet(InpaintingNet):
     """The network of preset `best` for an image of 64 x 64 cells; its class head knows the kinds of shapes."""
 
-    def __init__(self, width: int = 16) -> None:
-        super().__init__(len(KINDS), layers_frame(ReferenceBox(1.0, 1.0, 1.0)).edges, width)
+    def __init__(self) -> None:
+        super().__init__(len(KINDS), layers_frame(ReferenceBox(1.0, 1.0, 1.0)).edges)
         self.classify = nn.Sequential(
-            nn.Conv2d(8 * width, 32, 1),
+            nn.Conv2d(self.inject.out_features, 32, 1),
             nn.ReLU(),
             nn.Flatten(),
             nn.Dropout(0.2),

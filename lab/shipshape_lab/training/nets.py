@@ -152,11 +152,9 @@ class InpaintingNet(nn.Module):
     their top.
     """
 
-    def __init__(
-        self, classes: int, edges: tuple[float, ...], widths: tuple[int, int, int] = (32, 64, 128)
-    ) -> None:
+    def __init__(self, classes: int, edges: tuple[float, ...]) -> None:
         super().__init__()
-        near, middle, far = widths
+        near, middle, far = 32, 64, 128
         self.down = nn.ModuleList(
             [
                 nn.Sequential(_conv(18, near, 2), _conv(near, near)),
