@@ -43,7 +43,7 @@ QUICK = Plan(
     hulls=20,
     epochs={
         "aligned": 8,
-        "points": 6,
+        "points": 3,
         "inpainting": 5,
         "inpainting_": 1,
         "prior": 2,
