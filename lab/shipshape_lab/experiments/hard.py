@@ -26,6 +26,8 @@ LEAST_ACCURACY = 0.95
 CENTRES_M = range(NEAREST_M + 15, FARTHEST_M - 15 + 1)
 SHOWN_CENTRES_M = CENTRES_M[::5]  # of the curve that is kept for the figure
 UNKNOWN = "unknown"
+POINT_BANDS = ((10, 20), (20, 40), (40, 80), (80, None))
+POINTS = tuple(f"{low}_{high - 1}_points" if high else f"{low}_points_up" for low, high in POINT_BANDS)
 
 
 def of_answers(truth: Truth, answers: Answers, catalogue: Sequence[str]) -> Numbers:
@@ -34,9 +36,10 @@ def of_answers(truth: Truth, answers: Answers, catalogue: Sequence[str]) -> Numb
     known = truth.label < len(catalogue)
     found: Numbers = {"H.clusters": len(truth.label), "H.refused": numbers.refused(answers)}
     found |= {f"H.clusters.{part}": int(mask.sum()) for part, mask in masks.items() if part != "overall"}
-    for system in answers.system.tolist():
-        said = answers.of(system)
-        right = said.decision == truth.label
+    wrong = {system: answers.of(system).decision != truth.label for system in answers.system.tolist()}
+    found |= {f"H.error_shared.{s}": (wrong[BEST] & wrong[s]).mean() for s in wrong if s != BEST}
+    for system, misses in wrong.items():
+        said, right = answers.of(system), ~misses
         for part, mask in masks.items():
             found[f"H.error.{system}{'' if part == 'overall' else f'.{part}'}"] = 1.0 - right[mask].mean()
         found[f"H.reach_m.{system}"] = reach_m(truth.range_m, right)
@@ -51,8 +54,10 @@ def of_answers(truth: Truth, answers: Answers, catalogue: Sequence[str]) -> Numb
 
 
 def slices(truth: Truth, vessels: int) -> Masks:
-    """Masks of the clusters: all, bands of distance, sensors, occluded or not, aspects, known or not, types."""
+    """Masks of the clusters: all, bands of distance and points, sensors, occluded, aspects, known or not, types."""
     masks = {"overall": np.ones(len(truth.label), np.bool_), **numbers.band_slices(truth.range_m)}
+    for part, (low, high) in zip(POINTS, POINT_BANDS, strict=True):
+        masks[part] = (truth.points >= low) & (truth.points < (high or np.inf))
     masks |= {str(lidar): truth.lidar == lidar for lidar in np.unique(truth.lidar)}
     if np.isfinite(truth.hidden_share).all():
         occluded = truth.hidden_share >= OCCLUDED_FROM

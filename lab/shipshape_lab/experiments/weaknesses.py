@@ -2,10 +2,11 @@
 
 from collections.abc import Iterable, Iterator
 
+from shipshape_lab.experiments.hard import POINTS
 from shipshape_lab.experiments.markdown import DISTANCE_SLICES, asked, spoken
 from shipshape_lab.experiments.numbers import BANDS, Numbers, aspect_names
 from shipshape_lab.experiments.rejection import GROUPS
-from shipshape_lab.experiments.systems import BEST
+from shipshape_lab.experiments.systems import BEST, RIVALS
 from shipshape_lab.experiments.targets import MISSED, TARGETS, as_percent
 
 _ASPECTS = ("bow_on", "stern_on", *aspect_names())
@@ -22,6 +23,7 @@ def weaknesses(numbers: Numbers, catalogue: Iterable[str]) -> list[str]:
     """Sentences, most important first; empty only where nothing was measured."""
     return [
         *_unmet(numbers),
+        *_hard(numbers),
         *_worst(numbers, tuple(catalogue)),
         *_beaten(numbers),
         *_restoration(numbers),
@@ -36,6 +38,23 @@ def _unmet(numbers: Numbers) -> Iterator[str]:
         value, verdict = target.verdict(numbers)
         if verdict == MISSED:
             yield f"Target not reached: {target.text} ({value}, wanted {target.wanted})."
+
+
+def _hard(numbers: Numbers) -> Iterator[str]:
+    """Why the errors on H could not be halved, what was tried and what it would take."""
+    rivals = {rival: numbers[f"H.error.{rival}"] for rival in RIVALS if f"H.error.{rival}" in numbers}
+    if not rivals or f"H.error.best.{POINTS[0]}" not in numbers:
+        return
+    rival = min(rivals, key=rivals.__getitem__)
+    both, half = as_percent(numbers[f"H.error_shared.{rival}"]), as_percent(rivals[rival] / 2)
+    few = ", ".join(f"{spoken(part)} {as_percent(numbers[f'H.error.best.{part}'])}" for part in POINTS)
+    yield (
+        f"H: half of the errors of `{rival}` would be {half}; on {both} of the clusters both it and `best` are "
+        f"wrong, whatever chooses between them. The errors of `best` are those of small clusters: {few}. Tried on "
+        "validation, where no command repeats it: weights of the evidence that depend on range and number of "
+        "points (no gain). It would take more returns of the vessel, from several scans of one track, or far more "
+        "training clusters of few points."
+    )
 
 
 def _worst(numbers: Numbers, catalogue: tuple[str, ...]) -> Iterator[str]:

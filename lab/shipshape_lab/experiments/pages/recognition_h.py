@@ -1,5 +1,6 @@
 """Section: the hard test H."""
 
+from shipshape_lab.experiments.hard import POINTS
 from shipshape_lab.experiments.markdown import asked, by_slice, figure, percent, plain, spoken, table
 from shipshape_lab.experiments.numbers import BANDS, Numbers, aspect_names
 from shipshape_lab.experiments.pages.recognition_p import pose
@@ -23,6 +24,7 @@ def section(numbers: Numbers, about: dict) -> str:
             _whole(numbers),
             figure("hard.png", "accuracy on H by range, and the reach of each system"),
             by_slice(numbers, prefix, _BANDS, head),
+            by_slice(numbers, prefix, POINTS, head),
             by_slice(numbers, prefix, (*_SENSORS, *_OCCLUDED, "bow_on", "stern_on"), head),
             by_slice(numbers, prefix, aspect_names(), head),
             "What `best` decides, % of the clusters of each class:",
@@ -48,12 +50,13 @@ has no "unknown", so half of H is beyond it; "right vessel" counts the catalogue
 
 *Reach*: the range up to which the decision is right for at least 95 % in every window of 30 m, going out metre by
 metre; 30 m stands for less than 95 % in the nearest window, 200 m for never less. *Occluded*: something in front
-took away at least a tenth of the returns."""
+took away at least a tenth of the returns. *Shared*: wrong decisions that `best` makes on the same clusters."""
 
 
 def _whole(numbers: Numbers) -> str:
     shares = (
         "H.error.{}",
+        "H.error_shared.{}",
         "H.accuracy_known.{}",
         "H.called_unknown.{}.in_catalogue",
         "H.called_unknown.{}.outside",
@@ -67,6 +70,7 @@ def _whole(numbers: Numbers) -> str:
         (
             "%",
             "wrong decision",
+            "shared",
             "right vessel",
             "catalogue called unknown",
             "others called unknown",
