@@ -54,7 +54,7 @@ def of_answers(truth: Truth, answers: Answers, catalogue: Sequence[str]) -> Numb
 
 
 def slices(truth: Truth, vessels: int) -> Masks:
-    """Masks of the clusters: all, bands of distance and points, sensors, occluded, aspects, known or not, types."""
+    """Masks of the clusters: all, bands of distance and points, sensors, occluded, aspect, known or not, type."""
     masks = {"overall": np.ones(len(truth.label), np.bool_), **numbers.band_slices(truth.range_m)}
     for part, (low, high) in zip(POINTS, POINT_BANDS, strict=True):
         masks[part] = (truth.points >= low) & (truth.points < (high or np.inf))
