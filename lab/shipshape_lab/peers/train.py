@@ -7,9 +7,9 @@
 The schedule is that of the networks of preset `best`: AdamW, one cycle with a peak rate of 2e-3, batches of 64,
 examples drawn afresh every epoch (mirrored or not, thinned or not, sensor height told or not), label smoothing
 0.02. On 40,000 clusters that is 8 epochs or 320,000 examples for pointnet, 7 or 280,000 for pointnet2; the
-networks of `best` see 240,000 to 280,000. mirrored_spd2 is trained as the classifier of restored clouds is: 8
-keypoints a cluster described once, 4 epochs, batches of 256. It needs the trained pose of preset `best`, from any
-folder with points.onnx and aligned.onnx.
+networks of `best` see more: the first look 360,000, the aligned looks 400,000, the restorer 600,000. mirrored_spd2
+is trained as the classifier of restored clouds is: 8 keypoints a cluster described once, 4 epochs, batches of 256.
+It needs the trained pose of preset `best`, from any folder with points.onnx and aligned.onnx.
 
 Stopped and started again, training goes on after the last whole epoch.
 """
