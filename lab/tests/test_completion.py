@@ -143,6 +143,10 @@ def test_what_is_trained_is_what_is_loaded(model, data, tiny_plans, tmp_path):
     assert_allclose(cloud, completer.complete(points, POSE))
     both = len(completer.net(torch.rand(1, 32, 3))[-1][0]) + len(points) * completer.with_measured
     assert cloud.shape == (both, 3)
+    about = load.training_of(tmp_path / model)
+    plan = plans.PLANS[model, about.schedule]
+    assert (about.schedule, about.clusters) == ("reduced", plan.rounds * plan.clusters)
+    assert about.last_gain < 1.0
 
 
 def test_a_turned_vessel_is_completed_alike():

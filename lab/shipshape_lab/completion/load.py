@@ -66,3 +66,26 @@ def load_completer(folder: Path) -> Completer:
     net = plan.net()
     net.load_state_dict(torch.load(folder / "weights.pt", weights_only=True, map_location="cpu"))
     return Completer(folder.name, net.eval(), plan.seen, about["with_measured"])
+
+
+@dataclass(frozen=True)
+class Training:
+    """How long a network was trained.
+
+    Attributes:
+        schedule: one of SCHEDULES.
+        clusters: drawn in all rounds together.
+        last_gain: share of the CD-L1 on validation that the last round took away.
+    """
+
+    schedule: str
+    clusters: int
+    last_gain: float
+
+
+def training_of(folder: Path) -> Training:
+    """How the network in `folder`, which has its name, was trained."""
+    about = json.loads((folder / "completer.json").read_text())
+    plan = PLANS[folder.name, about["schedule"]]
+    before, last = [scores["cd_l1"] for scores in about["rounds"].values()][-2:]
+    return Training(about["schedule"], plan.rounds * plan.clusters, 1.0 - last / before)

@@ -66,6 +66,8 @@ def spoken(name: str) -> str:
     words = name.split("_")
     if words[0] == "aspect":
         return f"aspect {words[1]}-{words[2]} deg"
+    if "points" in words:
+        return f"{words[0]}-{words[1]} points" if words[-1] == "points" else f"{words[0]} points or more"
     if name.endswith("m") and name[:-1].replace("_", "").isdigit():
         return f"{name[:-1].replace('_', '-')} m"
     ends = {"beyond_70m": "beyond 70 m", "bow_on": "bow-on", "stern_on": "stern-on", "overall": "all"}

@@ -119,6 +119,20 @@ def load_completers(folder: Path | None) -> list:
     return list(load(folder))
 
 
+def trainings(args: argparse.Namespace, completers: Sequence) -> tuple[dict[str, str], Numbers]:
+    """Schedule of each completion network, and the numbers of how long it was trained."""
+    if not completers:
+        return {}, {}
+    from shipshape_lab.completion.load import training_of  # noqa: PLC0415  it needs torch, the rest does not
+
+    found = {completer.name: training_of(args.completers / completer.name) for completer in completers}
+    trained_on: Numbers = {}
+    for name, training in found.items():
+        trained_on[f"{args.set}.completer.{name}.clusters"] = training.clusters
+        trained_on[f"{args.set}.completer.{name}.last_gain"] = training.last_gain
+    return {name: training.schedule for name, training in found.items()}, trained_on
+
+
 def main(argv: list[str] | None = None) -> None:
     """Command line: one pass over the subsample."""
     args = _parser().parse_args(argv)
@@ -135,7 +149,9 @@ def main(argv: list[str] | None = None) -> None:
     with np.load(path, allow_pickle=False) as arrays:
         truth = examples.clusters.range_m[index], examples.clusters.aspect_deg[index]
         found = of_scores(args.set, arrays["scores"], *truth)
-    outcome.write(args.out, path.stem, found, **about_bundle(bundle), every=every, sensor_height="not told")
+    schedules, trained_on = trainings(args, completers)
+    about = {**about_bundle(bundle), "every": every, "sensor_height": "not told", "completers": schedules}
+    outcome.write(args.out, path.stem, found | trained_on, **about)
     for cloud in CLOUDS:
         if f"{args.set}.cd_l1.{cloud}" in found:
             l1, l2, f, points = (found[f"{args.set}.{what}.{cloud}"] for what in SCORES)

@@ -7,7 +7,7 @@ from shipshape_lab.experiments.markdown import DISTANCE_SLICES, asked, spoken
 from shipshape_lab.experiments.numbers import BANDS, Numbers, aspect_names
 from shipshape_lab.experiments.rejection import GROUPS
 from shipshape_lab.experiments.systems import BEST, RIVALS
-from shipshape_lab.experiments.targets import MISSED, TARGETS, as_percent
+from shipshape_lab.experiments.targets import COMPLETERS, MISSED, TARGETS, as_percent
 
 _ASPECTS = ("bow_on", "stern_on", *aspect_names())
 _BANDS = tuple(f"{low}_{high}m" for low, high in BANDS)
@@ -16,6 +16,7 @@ _SLICES = {
     "far": ("", *_BANDS, *_ASPECTS),
     "H": ("", *_BANDS, "occluded", "not_occluded", *_ASPECTS),
 }
+_STILL_FALLING = 0.02  # share of its error that a network's last round took away
 _SURE = 0.02  # said more often than it is right by this much: worth a sentence
 
 
@@ -27,6 +28,7 @@ def weaknesses(numbers: Numbers, catalogue: Iterable[str]) -> list[str]:
         *_worst(numbers, tuple(catalogue)),
         *_beaten(numbers),
         *_restoration(numbers),
+        *_completers(numbers),
         *_unknown(numbers, tuple(catalogue)),
         *_spread(numbers),
         *_refusal(numbers),
@@ -114,6 +116,21 @@ def _restoration(numbers: Numbers) -> Iterator[str]:
         ]
         if ahead:
             yield f"{name}: clouds whose CD-L1 is as low as the restored one's or lower: {', '.join(ahead)}."
+
+
+def _completers(numbers: Numbers) -> Iterator[str]:
+    trained = {
+        peer: numbers[f"P.completer.{peer}.clusters"]
+        for peer in COMPLETERS
+        if numbers.get(f"P.completer.{peer}.last_gain", 0.0) > _STILL_FALLING
+    }
+    if trained:
+        said = " and ".join(f"`{peer}` on {clusters:,.0f}" for peer, clusters in trained.items())
+        yield (
+            f"Restoration: the completion networks were trained shorter than they could be, {said} clusters; "
+            "their error was still falling. At the published size and schedule, which wants a GPU "
+            "(`shipshape-lab completers --schedule full`), they may be ahead; in milliseconds they stay behind."
+        )
 
 
 def _unknown(numbers: Numbers, catalogue: tuple[str, ...]) -> Iterator[str]:

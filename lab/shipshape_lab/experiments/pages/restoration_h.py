@@ -2,7 +2,7 @@
 
 from shipshape_lab.experiments.markdown import figure
 from shipshape_lab.experiments.numbers import BANDS, Numbers, aspect_names
-from shipshape_lab.experiments.pages.restoration_p import by_slice, scores
+from shipshape_lab.experiments.pages.restoration_p import by_slice, completers, scores
 
 TITLE = "Restoration, on H"
 COMMAND = """\
@@ -16,6 +16,7 @@ def section(numbers: Numbers, about: dict) -> str:
     return "\n\n".join(
         [
             INTRODUCTION.format(clusters=numbers["H.restoration.clusters"], every=about["every"]),
+            *completers(numbers, "H", about),
             scores(numbers, "H"),
             by_slice(numbers, "H", tuple(f"{low}_{high}m" for low, high in BANDS)),
             by_slice(numbers, "H", tuple(aspect_names())),

@@ -1,6 +1,6 @@
 """Section: how close the restored cloud comes to the whole vessel, on P."""
 
-from shipshape_lab.experiments.markdown import DISTANCE_SLICES, figure, plain, spoken, table
+from shipshape_lab.experiments.markdown import DISTANCE_SLICES, figure, percent, plain, spoken, table
 from shipshape_lab.experiments.numbers import Numbers, aspect_names
 from shipshape_lab.experiments.restoration import CLOUDS, REFERENCE_POINTS
 
@@ -18,6 +18,7 @@ def section(numbers: Numbers, about: dict) -> str:
             INTRODUCTION.format(
                 clusters=numbers["P.restoration.clusters"], every=about["every"], reference=REFERENCE_POINTS
             ),
+            *completers(numbers, "P", about),
             scores(numbers, "P"),
             figure("restoration.png", "CD-L1 and F-score by distance"),
             by_slice(numbers, "P", DISTANCE_SLICES),
@@ -36,6 +37,16 @@ points as they have. `mirrored` is the raw cluster and its reflection about the 
 `mirrored_true_pose` about the true one; `pcn` and `snowflakenet` complete the cluster in the pose that `best`
 estimates; `surface` is what {reference} other points of the true surface would score, the level that a perfect
 cloud of about that size reaches."""
+
+
+def completers(numbers: Numbers, name: str, about: dict) -> list[str]:
+    """How long each completion network was trained, a paragraph each."""
+    key = f"{name}.completer.{{}}.{{}}".format
+    return [
+        f"`{one}` was trained on the {schedule} schedule, {numbers[key(one, 'clusters')]:,} clusters; its last "
+        f"round took away {percent(numbers, key(one, 'last_gain'))} % of its CD-L1 on validation."
+        for one, schedule in about["completers"].items()
+    ]
 
 
 def scores(numbers: Numbers, name: str) -> str:
