@@ -53,9 +53,13 @@ def correct(pose: Pose, *, turn: float, shift: Float32[np.ndarray, " 3"], size: 
 
     `size` holds log(length / pose length), log(beam / pose length) and log(height / pose length).
     """
-    length = pose.size.length
-    step = frames.R_level_vessel(pose.heading) @ (shift[:2].astype(np.float64) * length)
+    length, (ahead, aside, up) = pose.size.length, shift.tolist()
+    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
     x, y, z = pose.origin_level
-    origin = (x + float(step[0]), y + float(step[1]), z + float(shift[2]) * length)
-    new_length, beam, height = (float(side) for side in length * np.exp(size))
+    origin = (
+        x + (ahead * cos - aside * sin) * length,
+        y + (ahead * sin + aside * cos) * length,
+        z + up * length,
+    )
+    new_length, beam, height = (length * math.exp(side) for side in size.tolist())
     return Pose(frames.wrap_angle(pose.heading + turn), origin, ReferenceBox(new_length, beam, height))

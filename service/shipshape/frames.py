@@ -5,6 +5,8 @@ import math
 import numpy as np
 from jaxtyping import Float32, Float64
 
+from shipshape import kernels
+
 
 def wrap_angle(angle: float) -> float:
     """The same angle in (-pi, pi], radians."""
@@ -28,10 +30,10 @@ def to_vessel(
     points_level: Float32[np.ndarray, "n 3"], heading: float, origin_level: tuple[float, float, float]
 ) -> Float32[np.ndarray, "n 3"]:
     """Level-frame points expressed in the frame with yaw `heading` and its origin at `origin_level`."""
-    centred = points_level - np.asarray(
-        origin_level, dtype=np.float32
-    )  # first: far from the origin, digits are few
-    points_vessel: Float32[np.ndarray, "n 3"] = centred @ _about_z(heading)
+    points_level = np.ascontiguousarray(points_level, np.float32)
+    points_vessel: Float32[np.ndarray, "n 3"] = kernels.into_frame(
+        points_level, float(heading), _floats(origin_level)
+    )
     return points_vessel
 
 
@@ -39,15 +41,17 @@ def to_level(
     points_vessel: Float32[np.ndarray, "n 3"], heading: float, origin_level: tuple[float, float, float]
 ) -> Float32[np.ndarray, "n 3"]:
     """The inverse of `to_vessel`."""
-    turned: Float32[np.ndarray, "n 3"] = points_vessel @ _about_z(heading).T
-    turned += np.asarray(origin_level, dtype=np.float32)
-    return turned
+    points_vessel = np.ascontiguousarray(points_vessel, np.float32)
+    points_level: Float32[np.ndarray, "n 3"] = kernels.out_of_frame(
+        points_vessel, float(heading), _floats(origin_level)
+    )
+    return points_level
 
 
-def _about_z(heading: float) -> Float32[np.ndarray, "3 3"]:
-    """Rotation from the vessel frame to the level frame; times a row of points from the right, its inverse."""
-    cos, sin = math.cos(heading), math.sin(heading)
-    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]], np.float32)
+def _floats(origin: tuple[float, float, float]) -> tuple[float, float, float]:
+    # Kernels are compiled anew for each kind of number.
+    x, y, z = origin
+    return float(x), float(y), float(z)
 
 
 def aspect_deg(heading: float, origin_level: tuple[float, float, float]) -> float:

@@ -4,7 +4,7 @@ Compiled code is cached on disk; the first call in a fresh environment compiles,
 it before the service is ready. Arrays are contiguous: a strided one would be compiled for once more.
 """
 
-from shipshape.kernels.clouds import Extent, extent
+from shipshape.kernels.clouds import Extent, extent, into_frame, out_of_frame
 from shipshape.kernels.groups import describe_groups, farthest_points, in_ball
 from shipshape.kernels.images import grey_levels, lift_columns, rasterise, stack_planes
 from shipshape.kernels.neighbours import count_neighbours, select_spread
@@ -20,7 +20,9 @@ __all__ = [
     "farthest_points",
     "grey_levels",
     "in_ball",
+    "into_frame",
     "lift_columns",
+    "out_of_frame",
     "rasterise",
     "select_spread",
     "silhouette",

@@ -29,3 +29,34 @@ def extent(points: Float32[np.ndarray, "n 3"], bearing: float) -> Extent:
             upper[axis] = max(upper[axis], value)
             total[axis] += value
     return Extent(lower, upper, total / len(points))
+
+
+Place = tuple[float, float, float]
+
+
+@njit(cache=True, nogil=True)
+def into_frame(points: Float32[np.ndarray, "n 3"], yaw: float, origin: Place) -> Float32[np.ndarray, "n 3"]:
+    """The points as seen in a frame with its origin at `origin`, turned about z by `yaw` radians."""
+    cos, sin = np.float32(np.cos(yaw)), np.float32(np.sin(yaw))
+    x0, y0, z0 = np.float32(origin[0]), np.float32(origin[1]), np.float32(origin[2])
+    seen = np.empty(points.shape, np.float32)
+    for i in range(len(points)):
+        x, y = points[i, 0] - x0, points[i, 1] - y0  # first: far from the origin, digits are few
+        seen[i, 0] = x * cos + y * sin
+        seen[i, 1] = y * cos - x * sin
+        seen[i, 2] = points[i, 2] - z0
+    return seen
+
+
+@njit(cache=True, nogil=True)
+def out_of_frame(points: Float32[np.ndarray, "n 3"], yaw: float, origin: Place) -> Float32[np.ndarray, "n 3"]:
+    """The inverse of `into_frame`."""
+    cos, sin = np.float32(np.cos(yaw)), np.float32(np.sin(yaw))
+    x0, y0, z0 = np.float32(origin[0]), np.float32(origin[1]), np.float32(origin[2])
+    placed = np.empty(points.shape, np.float32)
+    for i in range(len(points)):
+        x, y = points[i, 0], points[i, 1]
+        placed[i, 0] = x * cos - y * sin + x0
+        placed[i, 1] = y * cos + x * sin + y0
+        placed[i, 2] = points[i, 2] + z0
+    return placed
