@@ -60,7 +60,8 @@ class BestMethod:
     def classification(self, work: Work) -> None:
         """Prior, aligned looks, bottleneck and restored cloud, weighted as validation says."""
         restored = classification.mean_confidence(work.images, self._models["spd2"])
-        evidence = [work.prior, softmax(work.look.class_logits), softmax(work.bottleneck), restored]
+        looks = softmax(np.stack([work.look.class_logits, work.bottleneck]))
+        evidence = [work.prior, *looks, restored]
         fused = classification.fuse(evidence, self._parameters["fusion_weights"])
         measured_along = work.points_vessel[: len(work.contact.points_level), 0]  # they come first
         work.probabilities = classification.rule_out_too_long(fused, float(np.ptp(measured_along)), self._longest)

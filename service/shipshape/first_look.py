@@ -6,6 +6,7 @@ PointNeXt, Qian et al., NeurIPS 2022). What it says needs no pose, so nothing th
 mislead it twice.
 """
 
+import cmath
 import math
 from dataclasses import dataclass
 
@@ -74,14 +75,13 @@ def first_look(points_sight: Float32[np.ndarray, "n 3"], sight: SightFrame, mode
     """Show the network the cluster."""
     inputs = network_inputs(points_sight, sight)
     axis, shift, size, bow, classes = model.run(**{name: value[None] for name, value in inputs.items()})
-    rotation = frames.R_level_vessel(sight.bearing)
-    step = rotation @ (shift[0].astype(np.float64) * UNIT)
-    bow_x, bow_y = rotation @ bow[0].astype(np.float64)
+    outward = cmath.rect(1.0, sight.bearing)
+    step = complex(*shift[0].tolist()) * UNIT * outward
+    ahead = complex(*bow[0].tolist()) * outward
     x, y, z = sight.origin_level
-    length, beam, height = (float(side) for side in np.exp(size[0]))
     pose = Pose(
-        frames.wrap_angle(sight.bearing + 0.5 * math.atan2(float(axis[0, 0]), float(axis[0, 1]))),
-        (x + float(step[0]), y + float(step[1]), z),
-        ReferenceBox(length, beam, height),
+        frames.wrap_angle(sight.bearing + 0.5 * math.atan2(*axis[0].tolist())),
+        (x + step.real, y + step.imag, z),
+        ReferenceBox(*map(math.exp, size[0].tolist())),
     )
-    return FirstLook(pose, (float(bow_x), float(bow_y)), classes[0])
+    return FirstLook(pose, (ahead.real, ahead.imag), classes[0])

@@ -72,11 +72,6 @@ def by_network(points_level: Float32[np.ndarray, "n 3"], pose: Pose, model: Onnx
     for _ in range(looks - 1):
         found.append(look(points_level, found[-1].pose.turned(math.pi), model))
     last = found[-1]
-    directions = (-1.0) ** np.arange(looks - 1, -1, -1)
-    class_logits: Float32[np.ndarray, " classes"] = np.stack([one.class_logits for one in found]).mean(axis=0)
-    return Look(
-        pose=last.pose,
-        heading_std=last.heading_std,
-        flip_logit=float(np.mean(directions * [one.flip_logit for one in found])),
-        class_logits=class_logits,
-    )
+    flip_logits = (one.flip_logit * (-1.0) ** k for k, one in enumerate(reversed(found)))
+    class_logits: Float32[np.ndarray, " classes"] = np.mean([one.class_logits for one in found], axis=0)
+    return Look(last.pose, last.heading_std, sum(flip_logits) / looks, class_logits)
