@@ -112,7 +112,7 @@ def test_the_centred_iou_is_biased_where_a_face_is_cut_short() -> None:
 
 
 @properties(200)
-@given(ANGLES, ANGLES, SIZES, st.floats(30.0, 120.0))
+@given(ANGLES, ANGLES, SIZES, st.floats(45.0, 120.0))  # no hull reaches the sensor: the longest is 72 m
 def test_the_box_is_laid_against_the_faces_that_are_seen(
     yaw: float, bearing: float, size: ReferenceBox, distance: float
 ) -> None:
