@@ -77,7 +77,7 @@ def _hard(figure: Figure, numbers: Numbers) -> None:
     axes = figure.subplots()
     least = 100 * hard.LEAST_ACCURACY
     axes.axhline(least, color="0.4", linewidth=1.0, linestyle="--")
-    axes.text(199, least + 0.4, "95 %: a line's reach ends where it first falls under", ha="right", fontsize=8)
+    axes.text(31, least - 0.5, "95 %: a line's reach ends where it first falls under", va="top", fontsize=8)
     for system in asked(numbers, "H.error."):
         if system in IMAGE_METHODS:
             continue  # without an "unknown" they get half of H wrong
