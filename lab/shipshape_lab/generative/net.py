@@ -7,39 +7,32 @@ decodes. The class is read off the measured part alone: the state in training ho
 import torch
 from torch import Tensor, nn
 
+from shipshape_lab.training.nets import LayerNet, conv
+
 PLANES, FEATURES = 18, 3  # of what was measured, as the stage `inpainting` makes them
 STATE = 15  # channels of a state: occupancy, top and bottom of three layers, and the offset along both axes
-
-
-def _conv(channels_in: int, channels_out: int, stride: int = 1) -> nn.Sequential:
-    return nn.Sequential(
-        nn.Conv2d(channels_in, channels_out, 3, stride, 1, bias=False),
-        nn.BatchNorm2d(channels_out),
-        nn.ReLU(inplace=True),
-    )
 
 
 def _levels(channels: int, width: int) -> nn.ModuleList:
     """Three levels, each half the size of the one before."""
     return nn.ModuleList(
         [
-            nn.Sequential(_conv(channels, width), _conv(width, width)),
-            nn.Sequential(_conv(width, 2 * width, 2), _conv(2 * width, 2 * width)),
-            nn.Sequential(_conv(2 * width, 4 * width, 2), _conv(4 * width, 4 * width)),
+            nn.Sequential(conv(channels, width), conv(width, width)),
+            nn.Sequential(conv(width, 2 * width, 2), conv(2 * width, 2 * width)),
+            nn.Sequential(conv(2 * width, 4 * width, 2), conv(4 * width, 4 * width)),
         ]
     )
 
 
-class FlowNet(nn.Module):
+class FlowNet(LayerNet):
     """Planes, features, state and time -> occupancy, top, bottom, offset expected at the end; class logits.
 
-    The outputs are those of the deterministic InpaintingNet, and bounded like them: heights by their layer
-    (`edges`, shares of the depth range), bottoms by their top. Works on 2 x 2 pixels at a time, which quarters
-    the cost.
+    The outputs are those of the deterministic InpaintingNet. Works on 2 x 2 pixels at a time, which quarters the
+    cost.
     """
 
     def __init__(self, classes: int, edges: tuple[float, ...], width: int = 32) -> None:
-        super().__init__()
+        super().__init__(edges)
         w = width
         self.fold, self.unfold = nn.PixelUnshuffle(2), nn.PixelShuffle(2)
         self.measured, self.noisy = _levels(4 * PLANES, w), _levels(4 * STATE, w)
@@ -50,18 +43,14 @@ class FlowNet(nn.Module):
         self.rise = nn.ModuleList([nn.Conv2d(4 * w, 2 * w, 1), nn.Conv2d(2 * w, w, 1)])
         self.up = nn.ModuleList(
             [
-                nn.Sequential(_conv(4 * w, 2 * w), _conv(2 * w, 2 * w)),
-                nn.Sequential(_conv(2 * w, w), _conv(w, w)),
+                nn.Sequential(conv(4 * w, 2 * w), conv(2 * w, 2 * w)),
+                nn.Sequential(conv(2 * w, w), conv(w, w)),
             ]
         )
         self.head = nn.Conv2d(w, 4 * STATE, 1)
         self.classify = nn.Sequential(
             nn.Conv2d(4 * w, 32, 1), nn.ReLU(), nn.Flatten(), nn.Dropout(0.2), nn.Linear(32 * 4 * 8, classes)
         )
-        lower = torch.tensor(edges[:-1], dtype=torch.float32).view(1, -1, 1, 1)
-        upper = torch.tensor(edges[1:], dtype=torch.float32).view(1, -1, 1, 1)
-        self.register_buffer("lower", lower)
-        self.register_buffer("thickness", upper - lower)
 
     def forward(self, planes: Tensor, features: Tensor, state: Tensor, time: Tensor) -> tuple[Tensor, ...]:
         """Image, features, state (n, 15, 32, 64) and time (n,) to the outputs named above, in that order."""
@@ -86,15 +75,7 @@ class FlowNet(nn.Module):
         for rise, up, skipped in zip(self.rise, self.up, reversed(levels[:-1]), strict=True):
             lifted = nn.functional.interpolate(rise(image), scale_factor=2.0, mode="nearest")
             image = up(torch.cat([lifted, skipped], dim=1))
-        out = self.unfold(self.head(image))
-        top = torch.sigmoid(out[:, 3:6])
-        bottom = top * torch.sigmoid(out[:, 6:9])
-        return (
-            torch.sigmoid(out[:, 0:3]),
-            self.lower + self.thickness * top,
-            self.lower + self.thickness * bottom,
-            0.5 * torch.tanh(out[:, 9:15]).unflatten(1, (2, 3)),
-        )
+        return self.bounded(self.unfold(self.head(image)))
 
     def state_of(self, occupancy: Tensor, top: Tensor, bottom: Tensor, offset: Tensor) -> Tensor:
         """The state (n, 15, 32, 64) of a vessel, or the one expected: each channel in [-1, 1], 0 where empty.

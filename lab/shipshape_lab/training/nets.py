@@ -6,7 +6,8 @@ from torch import Tensor, nn
 from shipshape.first_look import NEIGHBOURS
 
 
-def _conv(channels_in: int, channels_out: int, stride: int = 1) -> nn.Sequential:
+def conv(channels_in: int, channels_out: int, stride: int = 1) -> nn.Sequential:
+    """A 3 x 3 convolution, batch norm and ReLU; a stride of 2 halves the image."""
     return nn.Sequential(
         nn.Conv2d(channels_in, channels_out, 3, stride, 1, bias=False),
         nn.BatchNorm2d(channels_out),
@@ -20,13 +21,13 @@ class _Encoder(nn.Module):
     def __init__(self, planes: int, shape: tuple[int, int], features: int, width: int = 24) -> None:
         super().__init__()
         self.image = nn.Sequential(
-            _conv(planes, width, 2),
-            _conv(width, width),
-            _conv(width, 2 * width, 2),
-            _conv(2 * width, 2 * width),
-            _conv(2 * width, 4 * width, 2),
-            _conv(4 * width, 4 * width),
-            _conv(4 * width, 4 * width, 2),
+            conv(planes, width, 2),
+            conv(width, width),
+            conv(width, 2 * width, 2),
+            conv(2 * width, 2 * width),
+            conv(2 * width, 4 * width, 2),
+            conv(4 * width, 4 * width),
+            conv(4 * width, 4 * width, 2),
         )
         cells = (shape[0] // 16) * (shape[1] // 16)
         self.mix = nn.Sequential(
@@ -112,18 +113,18 @@ class UNet(nn.Module):
         w = width
         self.down = nn.ModuleList(
             [
-                nn.Sequential(_conv(planes, w), _conv(w, w)),
-                nn.Sequential(_conv(w, 2 * w, 2), _conv(2 * w, 2 * w)),
-                nn.Sequential(_conv(2 * w, 4 * w, 2), _conv(4 * w, 4 * w)),
-                nn.Sequential(_conv(4 * w, 8 * w, 2), _conv(8 * w, 8 * w)),
+                nn.Sequential(conv(planes, w), conv(w, w)),
+                nn.Sequential(conv(w, 2 * w, 2), conv(2 * w, 2 * w)),
+                nn.Sequential(conv(2 * w, 4 * w, 2), conv(4 * w, 4 * w)),
+                nn.Sequential(conv(4 * w, 8 * w, 2), conv(8 * w, 8 * w)),
             ]
         )
         self.rise = nn.ModuleList([nn.Conv2d(8 * w, 4 * w, 1), nn.Conv2d(4 * w, 2 * w, 1), nn.Conv2d(2 * w, w, 1)])
         self.up = nn.ModuleList(
             [
-                nn.Sequential(_conv(8 * w, 4 * w), _conv(4 * w, 4 * w)),
-                nn.Sequential(_conv(4 * w, 2 * w), _conv(2 * w, 2 * w)),
-                nn.Sequential(_conv(2 * w, w), _conv(w, w)),
+                nn.Sequential(conv(8 * w, 4 * w), conv(4 * w, 4 * w)),
+                nn.Sequential(conv(4 * w, 2 * w), conv(2 * w, 2 * w)),
+                nn.Sequential(conv(2 * w, w), conv(w, w)),
             ]
         )
 
@@ -144,37 +145,57 @@ class UNet(nn.Module):
         return image
 
 
-class InpaintingNet(nn.Module):
+class LayerNet(nn.Module):
+    """A network that tells layers of surface, heights within their `edges` (shares of the depth range)."""
+
+    def __init__(self, edges: tuple[float, ...]) -> None:
+        super().__init__()
+        lower = torch.tensor(edges[:-1], dtype=torch.float32).view(1, -1, 1, 1)
+        upper = torch.tensor(edges[1:], dtype=torch.float32).view(1, -1, 1, 1)
+        self.register_buffer("lower", lower)
+        self.register_buffer("thickness", upper - lower)
+
+    def bounded(self, out: Tensor) -> tuple[Tensor, ...]:
+        """(n, 15, 32, 64) of any number to occupancy, top, bottom (n, 3, 32, 64) and offset (n, 2, 3, 32, 64).
+
+        Heights stay in their layer, bottoms under their top, offsets in their cell.
+        """
+        top = torch.sigmoid(out[:, 3:6])
+        bottom = top * torch.sigmoid(out[:, 6:9])
+        return (
+            torch.sigmoid(out[:, 0:3]),
+            self.lower + self.thickness * top,
+            self.lower + self.thickness * bottom,
+            0.5 * torch.tanh(out[:, 9:15]).unflatten(1, (2, 3)),
+        )
+
+
+class InpaintingNet(LayerNet):
     """Aligned planes and their mirror -> occupancy, top, bottom, sub-cell offset of each layer; class logits.
 
     A U-Net at half the image's size, which tells four cells at each place: what was measured is laid over its
-    answer in full size anyway. Heights are bounded by their layer (`edges`, shares of the depth range), bottoms by
-    their top.
+    answer in full size anyway.
     """
 
     def __init__(self, classes: int, edges: tuple[float, ...]) -> None:
-        super().__init__()
+        super().__init__(edges)
         near, middle, far = 32, 64, 128
         self.down = nn.ModuleList(
             [
-                nn.Sequential(_conv(18, near, 2), _conv(near, near)),
-                nn.Sequential(_conv(near, middle, 2), _conv(middle, middle)),
-                nn.Sequential(_conv(middle, far, 2), _conv(far, far), _conv(far, far)),
+                nn.Sequential(conv(18, near, 2), conv(near, near)),
+                nn.Sequential(conv(near, middle, 2), conv(middle, middle)),
+                nn.Sequential(conv(middle, far, 2), conv(far, far), conv(far, far)),
             ]
         )
         self.inject = nn.Linear(3, far)
         self.rise = nn.ModuleList([nn.Conv2d(far, middle, 1), nn.Conv2d(middle, near, 1)])
         self.up = nn.ModuleList(
-            [nn.Sequential(_conv(width, width), _conv(width, width)) for width in (middle, near)]
+            [nn.Sequential(conv(width, width), conv(width, width)) for width in (middle, near)]
         )
         self.head = nn.Conv2d(near, 4 * 15, 1)
         self.classify = nn.Sequential(
             nn.Conv2d(far, 32, 1), nn.ReLU(), nn.Flatten(), nn.Dropout(0.2), nn.Linear(32 * 4 * 8, classes)
         )
-        lower = torch.tensor(edges[:-1], dtype=torch.float32).view(1, -1, 1, 1)
-        upper = torch.tensor(edges[1:], dtype=torch.float32).view(1, -1, 1, 1)
-        self.register_buffer("lower", lower)
-        self.register_buffer("thickness", upper - lower)
 
     def forward(self, planes: Tensor, features: Tensor) -> tuple[Tensor, ...]:
         """Image and features to the outputs named above, in that order."""
@@ -185,15 +206,7 @@ class InpaintingNet(nn.Module):
         for rise, up, skipped in zip(self.rise, self.up, (levels[2], levels[1]), strict=True):
             image = up(nn.functional.interpolate(rise(image), scale_factor=2.0, mode="nearest") + skipped)
         out = nn.functional.pixel_shuffle(self.head(image), 2)
-        top = torch.sigmoid(out[:, 3:6])
-        bottom = top * torch.sigmoid(out[:, 6:9])
-        return (
-            torch.sigmoid(out[:, 0:3]),
-            self.lower + self.thickness * top,
-            self.lower + self.thickness * bottom,
-            0.5 * torch.tanh(out[:, 9:15]).unflatten(1, (2, 3)),
-            self.classify(bottleneck),
-        )
+        return *self.bounded(out), self.classify(bottleneck)
 
 
 class GreyNet(nn.Module):
@@ -220,11 +233,11 @@ class Spd2Net(nn.Module):
     def __init__(self, classes: int) -> None:
         super().__init__()
         self.layers = nn.Sequential(
-            _conv(5, 24),
+            conv(5, 24),
             nn.MaxPool2d(2),
-            _conv(24, 48),
+            conv(24, 48),
             nn.MaxPool2d(2),
-            _conv(48, 64),
+            conv(48, 64),
             nn.MaxPool2d(2),
             nn.Flatten(),
             nn.Dropout(0.3),
