@@ -16,6 +16,7 @@ from shipshape.types import (
     Recognition,
     ReferenceBox,
     RestoredCloud,
+    Rung,
 )
 
 SIZE = ReferenceBox(length=12.0, beam=4.0, height=3.0)
@@ -76,7 +77,8 @@ def recognised(
         restored=RestoredCloud(cloud, np.arange(len(cloud)) < len(measured)),
         images=ImagePair(image, np.maximum(image, image[:, ::-1])),
         keypoints_level=cloud[:3],
-        rung="full",
+        rung=Rung.FULL,
+        rung_reason="",
         preset=preset,
         image_method=ImageMethod.FULL_TOP if paper else None,
         bundle="0123456789abcdef" * 4,

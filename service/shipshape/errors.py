@@ -4,7 +4,7 @@ ShipshapeError
 |-- InvalidInput          bytes -> contact: the caller sent something else than was asked for
 |   |-- TooLarge          more bytes, points or contacts than the limits allow
 |   `-- Unprocessable     well-formed, but not a vessel's cluster (NaN, too few points, too wide)
-|-- Overloaded            contact -> executor: the queue is full
+|-- Overloaded            contact -> executor: the queue is full, or too long for the time left
 |-- DeadlineExceeded      executor -> stages: the answer would come too late
 |-- Cancelled             executor -> stages: the caller left
 |-- NotReady              the service is starting or stopping
@@ -33,7 +33,11 @@ class Unprocessable(InvalidInput):
 
 
 class Overloaded(ShipshapeError):
-    """The bounded queue is full; the caller may come back later."""
+    """No place or no time behind all that waits; the caller may come back after `retry_after_s`, if known."""
+
+    def __init__(self, message: str, *, retry_after_s: float | None = None) -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
 
 
 class DeadlineExceeded(ShipshapeError):

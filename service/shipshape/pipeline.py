@@ -3,7 +3,12 @@
     pipeline = Pipeline(load_bundle(path))
     recognition = pipeline.run(contact)
 
-The staged executor takes the steps one by one instead: `begin`, each of `stages`, `finish`.
+The staged executor takes the steps one by one instead: `begin`, the stages of one rung of the `ladder`, `finish`.
+
+rung                 what it leaves out                                  preset
+full                 nothing                                             both
+without_restoration  projection to spd2: class from the looks alone      best
+heading_and_box      also the second aligned look                        best
 """
 
 import time
@@ -19,17 +24,28 @@ from shipshape.paper import PaperMethod
 from shipshape.reasons import measure, reasons_of
 from shipshape.stages import keypoints, spd2
 from shipshape.stages.keypoints import KeypointParams
-from shipshape.types import Box, Contact, ImagePair, Options, Preset, Recognition
+from shipshape.types import Box, Contact, ImagePair, Options, Preset, Recognition, Rung
 from shipshape.validation import ContactLimits, check_contact
 from shipshape.work import Work
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)  # the executor learns the cost of each object
 class Stage:
     """One named step of the pipeline; it reads and fills the fields of the work it is given."""
 
     name: str
     run: Callable[[Work], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+class RungStages:
+    """The stages of one rung, in order."""
+
+    name: Rung
+    stages: tuple[Stage, ...]
+
+
+Method = PaperMethod | BestMethod
 
 
 class Pipeline:
@@ -43,24 +59,16 @@ class Pipeline:
         check_fit(bundle)
         self.bundle = bundle
         self.limits = limits or ContactLimits()
-        self._methods: dict[Preset, PaperMethod | BestMethod] = {
-            Preset.PAPER: PaperMethod(bundle),
-            Preset.BEST: BestMethod(bundle),
-        }
+        paper, best = PaperMethod(bundle), BestMethod(bundle)
+        methods: dict[Preset, Method] = {Preset.PAPER: paper, Preset.BEST: best}
         self._names = [vessel.name for vessel in bundle.catalogue]
         self._common = bundle.parameters["common"]
         self._thresholds = bundle.parameters.get("reasons", {})
-        self.stages = (
-            Stage("prior", lambda work: self._method(work).prior(work)),
-            Stage("heading", lambda work: self._method(work).heading(work)),
-            Stage("bow_stern", lambda work: self._method(work).bow_stern(work)),
-            Stage("projection", lambda work: self._method(work).projection(work)),
-            Stage("inpainting", lambda work: self._method(work).inpainting(work)),
-            Stage("lifting", lambda work: self._method(work).lifting(work)),
-            Stage("keypoints", self._keypoints),
-            Stage("spd2", self._spd2),
-            Stage("classification", lambda work: self._method(work).classification(work)),
-        )
+        self.stages = self._stages(lambda work: methods[work.options.preset])
+        self._ladders = {
+            Preset.PAPER: (RungStages(Rung.FULL, self._stages(lambda work: paper)),),
+            Preset.BEST: _ladder(best, self._stages(lambda work: best)),
+        }
 
     def run(self, contact: Contact, options: Options | None = None) -> Recognition:
         """Recognise one contact.
@@ -88,8 +96,17 @@ class Pipeline:
         frame = sight.sight_frame(contact)
         return Work(contact, options, frame, sight.to_sight(contact.points_level, frame))
 
-    def finish(self, work: Work, stage_ms: Mapping[str, float]) -> Recognition:
-        """The answer, once every stage has run."""
+    def ladder(self, options: Options) -> tuple[RungStages, ...]:
+        """The rungs a contact may be computed on, the best first, down to the lowest that the caller accepts."""
+        accepted = list(Rung)[: list(Rung).index(options.lowest_rung) + 1]
+        return tuple(rung for rung in self._ladders[options.preset] if rung.name in accepted)
+
+    def finish(
+        self, work: Work, stage_ms: Mapping[str, float], rung: Rung = Rung.FULL, rung_reason: str = ""
+    ) -> Recognition:
+        """The answer, once every stage of its rung has run."""
+        if rung is not Rung.FULL:
+            work.leave_unrestored()
         best = int(np.argmax(work.probabilities[:-1]))
         own = work.contact.own_true_heading_deg
         pose = work.pose
@@ -99,7 +116,9 @@ class Pipeline:
             probability=float(work.probabilities[best]),
             probabilities=dict(zip([*self._names, UNKNOWN], map(float, work.probabilities), strict=True)),
             unknown=unknown,
-            reasons=reasons_of(measure(work), unknown=unknown, thresholds=self._thresholds),
+            reasons=reasons_of(
+                measure(work, restored=rung is Rung.FULL), unknown=unknown, thresholds=self._thresholds
+            ),
             heading=pose.heading,
             heading_std=work.heading_std,
             bow_probability=work.bow_probability,
@@ -107,17 +126,28 @@ class Pipeline:
             true_heading_deg=None if own is None else frames.true_heading_deg(pose.heading, own),
             box=_box(work),
             restored=work.restored,
-            images=ImagePair(work.before, work.after),
+            images=ImagePair(work.before, work.after) if rung is Rung.FULL else None,
             keypoints_level=pose.to_level(work.keypoints_vessel),
-            rung="full",
+            rung=rung,
+            rung_reason=rung_reason,
             preset=work.options.preset,
             image_method=work.options.image_method if work.options.preset is Preset.PAPER else None,
             bundle=self.bundle.digest,
             stage_ms=dict(stage_ms),
         )
 
-    def _method(self, work: Work) -> PaperMethod | BestMethod:
-        return self._methods[work.options.preset]
+    def _stages(self, method: Callable[[Work], Method]) -> tuple[Stage, ...]:
+        return (
+            Stage("prior", lambda work: method(work).prior(work)),
+            Stage("heading", lambda work: method(work).heading(work)),
+            Stage("bow_stern", lambda work: method(work).bow_stern(work)),
+            Stage("projection", lambda work: method(work).projection(work)),
+            Stage("inpainting", lambda work: method(work).inpainting(work)),
+            Stage("lifting", lambda work: method(work).lifting(work)),
+            Stage("keypoints", self._keypoints),
+            Stage("spd2", self._spd2),
+            Stage("classification", lambda work: method(work).classification(work)),
+        )
 
     def _is_unknown(self, work: Work) -> bool:
         *known, unknown = work.probabilities
@@ -129,6 +159,17 @@ class Pipeline:
 
     def _spd2(self, work: Work) -> None:
         work.images = spd2.describe(work.points_vessel, work.keypoints_vessel, self._common["spd2_radius"])
+
+
+def _ladder(best: BestMethod, full: tuple[Stage, ...]) -> tuple[RungStages, ...]:
+    """Each rung begins as far as it can with the stages of the one above: work can change over half-way."""
+    prior, heading, bow_stern = full[:3]
+    look, classification = Stage("heading", best.heading_in_one_look), Stage("classification", best.classify_looks)
+    return (
+        RungStages(Rung.FULL, full),
+        RungStages(Rung.WITHOUT_RESTORATION, (prior, heading, bow_stern, classification)),
+        RungStages(Rung.HEADING_AND_BOX, (prior, look, bow_stern, classification)),
+    )
 
 
 def _box(work: Work) -> Box:

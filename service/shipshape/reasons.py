@@ -4,7 +4,7 @@ Each rule compares one measure of the finished work with one threshold in `[para
 
 few_points        fewer points than `few_points`
 end_on            the line of sight is closer than `end_on_deg` to the vessel's long axis
-occluded          the share of the silhouette that is missing is over `occluded_above`
+occluded          the share of the silhouette that is missing is over `occluded_above`; needs a restored vessel
 bow_uncertain     the bow probability is below `bow_below`
 out_of_catalogue  the answer is "unknown"; its threshold is `common.unknown_above`
 
@@ -33,13 +33,14 @@ class Measures:
     bow_probability: float
 
 
-def measure(work: Work) -> Measures:
-    """The measures of a contact that has been restored."""
+def measure(work: Work, *, restored: bool = True) -> Measures:
+    """The measures of a contact; of one that was not restored, nobody knows what is missing."""
     aspect = frames.aspect_deg(work.pose.heading, work.pose.origin_level)
+    waterline = work.pose.origin_level[2]
     return Measures(
         points=len(work.contact.points_level),
         off_ends_deg=min(aspect, 180.0 - aspect),
-        missing_share=missing_share(work.restored, work.sight.bearing, work.pose.origin_level[2]),
+        missing_share=missing_share(work.restored, work.sight.bearing, waterline) if restored else 0.0,
         bow_probability=work.bow_probability,
     )
 

@@ -17,7 +17,8 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info
 # Seconds. Stages lie between 10 us and the budget; answers around the budget of 50 ms.
 STAGE_BUCKETS = (5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3, 25e-3, 50e-3, 0.1, 0.4, 1.6)
 REQUEST_BUCKETS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 25e-3, 35e-3, 50e-3, 70e-3, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-OK, CANCELLED, INTERNAL = "ok", "cancelled", "internal"
+AGE_BUCKETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 60.0)
+OK, DEGRADED, CANCELLED, INTERNAL = "ok", "degraded", "cancelled", "internal"
 SINGLE, SCAN = "recognise", "recognise_scan"  # the methods whose request is one contact, and many
 
 request_id: ContextVar[str] = ContextVar("request_id", default="")
@@ -34,7 +35,7 @@ def new_request_id(proposed: str = "") -> str:
 
 @dataclass(slots=True)
 class Outcome:
-    """How a request ended: "ok" or the kind of its error. The door writes it."""
+    """How a request ended: "ok", "degraded" or the kind of its error. The door writes it."""
 
     kind: str = OK
     contacts: int = 0  # that the request brought, as soon as it is known
@@ -55,11 +56,29 @@ class Metrics:
             buckets=REQUEST_BUCKETS,
             registry=registry,
         )
+        self._wait = Histogram(
+            "shipshape_queue_seconds",
+            "Time that a contact waited for a worker.",
+            ["lane"],
+            buckets=STAGE_BUCKETS,
+            registry=registry,
+        )
+        self._age = Histogram(
+            "shipshape_age_seconds",
+            "Age of the points when their request came, where the caller tells it.",
+            buckets=AGE_BUCKETS,
+            registry=registry,
+        )
         self._contacts = Counter(
             "shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"], registry=registry
         )
         self._in_flight = Gauge("shipshape_in_flight", "Requests under way.", ["door"], registry=registry)
         self._queue = Gauge("shipshape_queue_depth", "Contacts that wait for a worker.", registry=registry)
+        self._queue_age = Gauge(
+            "shipshape_queue_age_seconds",
+            "How long the contact has waited that has waited longest.",
+            registry=registry,
+        )
         self._running = Gauge("shipshape_running", "Contacts being computed.", registry=registry)
         self._ready = Gauge("shipshape_ready", "1 while the service takes requests.", registry=registry)
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
@@ -74,9 +93,20 @@ class Metrics:
         for outcome, count in collections.Counter(outcomes).items():
             self._contacts.labels(door, outcome).inc(count)
 
-    def watch_queue(self, depth: Callable[[], float], running: Callable[[], float]) -> None:
-        """Read both gauges from the executor whenever somebody scrapes."""
+    def observe_wait(self, lane: str, seconds: float) -> None:
+        """A contact of this lane waited; seconds."""
+        self._wait.labels(lane).observe(seconds)
+
+    def observe_age(self, seconds: float) -> None:
+        """The points of a request were this old; seconds."""
+        self._age.observe(seconds)
+
+    def watch_queue(
+        self, depth: Callable[[], float], age: Callable[[], float], running: Callable[[], float]
+    ) -> None:
+        """Read the gauges from the executor whenever somebody scrapes."""
         self._queue.set_function(depth)
+        self._queue_age.set_function(age)
         self._running.set_function(running)
 
     def set_ready(self, ready: bool) -> None:
@@ -108,7 +138,7 @@ class Metrics:
             seconds = time.perf_counter() - start
             in_flight.dec()
             self._request.labels(door, method, outcome.kind).observe(seconds)
-            if method == SINGLE or outcome.kind != OK:
+            if method == SINGLE or outcome.kind not in (OK, DEGRADED):
                 self.count_contacts(door, [outcome.kind] * outcome.contacts)
             _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
 

@@ -39,6 +39,14 @@ class ImageMethod(StrEnum):
     Z_SIDE = "z_side"
 
 
+class Rung(StrEnum):
+    """Of the ladder of ever cheaper answers, the best first; what each leaves out is said in `pipeline`."""
+
+    FULL = "full"
+    WITHOUT_RESTORATION = "without_restoration"
+    HEADING_AND_BOX = "heading_and_box"
+
+
 class Reason(StrEnum):
     """Why an answer is less sure than most; `reasons` says exactly when each is given."""
 
@@ -65,6 +73,7 @@ class Options:
 
     preset: Preset = Preset.BEST
     image_method: ImageMethod = ImageMethod.FULL_SIDE  # used by preset `paper` alone
+    lowest_rung: Rung = Rung.HEADING_AND_BOX  # the cheapest answer that is better than none
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,10 +151,11 @@ class Recognition:
     aspect_deg: float
     true_heading_deg: float | None  # clockwise from north; None unless the caller gave its own
     box: Box
-    restored: RestoredCloud
-    images: ImagePair
-    keypoints_level: Float32[np.ndarray, "k 3"]
-    rung: str  # of the ladder of ever cheaper answers; "full" is the only one so far
+    restored: RestoredCloud  # below rung `full`: the measured points alone
+    images: ImagePair | None  # None below rung `full`
+    keypoints_level: Float32[np.ndarray, "k 3"]  # none below rung `full`
+    rung: Rung  # `full` unless time was short
+    rung_reason: str  # why it is not `full`: a sentence; empty when it is
     preset: Preset
     image_method: ImageMethod | None  # None: the image of preset `best`
     bundle: str  # digest of the model bundle

@@ -38,3 +38,9 @@ class Work:
     keypoints_vessel: Float32[np.ndarray, "k 3"] = field(init=False)
     images: Float32[np.ndarray, "k 5 16 32"] = field(init=False)  # SPD2, of the keypoints
     probabilities: Float32[np.ndarray, " classes"] = field(init=False)  # the last is "unknown"
+
+    def leave_unrestored(self) -> None:
+        """Take what was measured for all there is: no stage restored anything."""
+        points = self.contact.points_level
+        self.restored = RestoredCloud(points, np.ones(len(points), np.bool_))
+        self.keypoints_vessel = np.empty((0, 3), np.float32)

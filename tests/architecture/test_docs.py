@@ -74,4 +74,5 @@ def _stages():
     calls = [
         node for node in ast.walk(tree) if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Stage"
     ]
-    return [call.args[0].value for call in sorted(calls, key=lambda call: call.lineno)]
+    names = [call.args[0].value for call in sorted(calls, key=lambda call: call.lineno)]
+    return list(dict.fromkeys(names))  # lower rungs of the ladder name some again

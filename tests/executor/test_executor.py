@@ -50,8 +50,15 @@ class Gate(Note):
         assert self.opened.wait(PATIENCE)
 
 
-def task(*stages, deadline=FAR, finish=lambda work, stage_ms: (work, dict(stage_ms))):
-    return Task(stages, Item(), finish, deadline)
+class Steps:
+    """A rung of these stages."""
+
+    def __init__(self, *stages, name="full"):
+        self.name, self.stages = name, stages
+
+
+def task(*stages, ladder=None, deadline=FAR, finish=lambda work, ended: (work, dict(ended.stage_ms)), **fields):
+    return Task(ladder or [Steps(*stages)], Item(), finish, deadline, **fields)
 
 
 @pytest.fixture
@@ -194,7 +201,7 @@ def test_a_stage_that_wants_to_exit_only_fails(executor):
 
 
 def test_an_error_in_finish_reaches_the_caller(executor):
-    def finish(work, stage_ms):
+    def finish(work, ended):
         raise KeyError("lost")
 
     with pytest.raises(KeyError):

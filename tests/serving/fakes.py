@@ -4,7 +4,7 @@ import os
 import threading
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import grpc
 import httpx
@@ -26,6 +26,7 @@ from shipshape.types import (
     Recognition,
     ReferenceBox,
     RestoredCloud,
+    Rung,
 )
 from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
@@ -53,10 +54,16 @@ FAKE_BUNDLE = Bundle(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FakeStage:
     name: str
     run: object
+
+
+@dataclass(frozen=True, eq=False)
+class FakeRung:
+    name: Rung
+    stages: object
 
 
 @dataclass
@@ -73,14 +80,18 @@ class FakePipeline:
         self.release = threading.Event()
         self.computed = []
         self.stages = (FakeStage("prior", self._prior), FakeStage("heading", lambda work: None))
+        self.rungs = (FakeRung(Rung.FULL, self.stages), FakeRung(Rung.HEADING_AND_BOX, self.stages[:1]))
 
     def begin(self, contact, options):
         check_contact(contact, ContactLimits())
         return FakeWork(contact, options)
 
-    def finish(self, work, stage_ms):
+    def ladder(self, options):
+        return [rung for rung in self.rungs if rung.name is Rung.FULL or options.lowest_rung is not Rung.FULL]
+
+    def finish(self, work, stage_ms, rung=Rung.FULL, rung_reason=""):
         self.computed.append(work.contact.contact_id)
-        return recognition_of(work, dict(stage_ms))
+        return replace(recognition_of(work, dict(stage_ms)), rung=rung, rung_reason=rung_reason)
 
     def _prior(self, work):
         if work.contact.contact_id == "crash":
@@ -110,7 +121,8 @@ def recognition_of(work, stage_ms):
         restored=RestoredCloud(np.concatenate([points, -points]), np.arange(2 * len(points)) < len(points)),
         images=ImagePair(image, 255 - image),
         keypoints_level=points[:3].copy(),
-        rung="full",
+        rung=Rung.FULL,
+        rung_reason="",
         preset=work.options.preset,
         image_method=work.options.image_method if paper else None,
         bundle=DIGEST,

@@ -1,7 +1,9 @@
-"""Runs staged work on a bounded queue and one worker thread a core; knows nothing of vessels."""
+"""Runs staged work on bounded queues and one worker thread a core; knows nothing of vessels."""
 
 from shipshape.executor.cores import usable_cores
-from shipshape.executor.executor import Counts, Executor
-from shipshape.executor.ticket import Clock, Stage, Task, Ticket
+from shipshape.executor.counts import Counts
+from shipshape.executor.executor import Executor
+from shipshape.executor.lanes import Lane
+from shipshape.executor.ticket import Clock, Ended, Rung, Stage, Task, Ticket
 
-__all__ = ["Clock", "Counts", "Executor", "Stage", "Task", "Ticket", "usable_cores"]
+__all__ = ["Clock", "Counts", "Ended", "Executor", "Lane", "Rung", "Stage", "Task", "Ticket", "usable_cores"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 from shipshape.errors import Cancelled, DeadlineExceeded
+from shipshape.executor.lanes import Lane
 
 Clock = Callable[[], float]  # monotonic seconds
 W = TypeVar("W")
@@ -29,18 +30,46 @@ class Stage(Protocol[W_contra]):
         ...
 
 
+class Rung(Protocol[W_contra]):
+    """One way of answering; a cheaper one begins with stages of a dearer one, so that work can change over."""
+
+    @property
+    def name(self) -> str:
+        """As answers tell it."""
+        ...
+
+    @property
+    def stages(self) -> Sequence[Stage[W_contra]]:
+        """In their order; costs are learned by stage, so each is hashable by identity."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a task was computed."""
+
+    rung: str
+    why: str  # it is not the top one: a sentence; empty for the top one
+    stage_ms: Mapping[str, float]
+
+
 @dataclass(frozen=True, slots=True, eq=False)  # work items hold arrays: only identity is meant
 class Task(Generic[W, R]):
-    """Work to be carried through `stages` in order, then turned into the answer by `finish`."""
+    """Work to be carried through the stages of one rung, then turned into the answer by `finish`."""
 
-    stages: Sequence[Stage[W]]
+    ladder: Sequence[Rung[W]]  # those that the caller accepts, the dearest and best first
     work: W
-    finish: Callable[[W, Mapping[str, float]], R]  # gets the milliseconds of each stage; runs on the worker
+    finish: Callable[[W, Ended], R]  # runs on the worker
     deadline: float  # on the executor's clock, seconds; an answer after it is worth nothing
+    lane: Lane = Lane.TRACKING
+    size: float = 0.0  # what the cost of a stage grows with
 
 
 class Ticket(Generic[R]):
     """The place where a task's answer, or its error, appears exactly once.
+
+    Attributes:
+        degraded: Whether the answer is of another rung than the first; known once it is there.
 
     Whoever settles first wins: the worker with the answer, the waiter at the deadline, or the caller that
     leaves. A ticket that settled early is the sign to the worker to drop the work at the next stage boundary.
@@ -48,6 +77,7 @@ class Ticket(Generic[R]):
 
     def __init__(self, deadline: float, clock: Clock) -> None:
         self.deadline = deadline
+        self.degraded = False
         self.future: Future[R] = Future()
         self._clock = clock
 

@@ -54,8 +54,11 @@ def _draw_cluster(canvas: Canvas, contact: Contact, recognition: Recognition) ->
 
 def _draw_images(canvas: Canvas, recognition: Recognition) -> None:
     x, width = _COLUMNS[1]
+    if (images := recognition.images) is None:
+        rect = Rect(x, _TOP, width, _FOOT_TOP - GAP - _TOP)
+        _frame(canvas, rect, "Not restored: time was short")
+        return
     height = (_FOOT_TOP - GAP - _TOP - GAP) / 2
-    images = recognition.images
     for index, (title, image) in enumerate((("Image", images.before), ("Inpainted", images.after))):
         frame = Rect(x, _TOP + index * (height + GAP), width, height)
         area = _panel(canvas, frame, f"{title}, {image.shape[1]} × {image.shape[0]} pixels")

@@ -3,20 +3,37 @@
 contact + wishes + deadline -> checks -> executor -> answer
 """
 
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 from shipshape.bundle import Bundle
 from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
-from shipshape.executor import Executor, Stage, Task, Ticket
+from shipshape.executor import Ended, Executor, Stage, Task, Ticket
+from shipshape.serving.age import age_of, time_left
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
 from shipshape.serving.timing import summed
-from shipshape.telemetry import OK, Metrics
-from shipshape.types import Contact, Options, Recognition
+from shipshape.telemetry import DEGRADED, OK, Metrics
+from shipshape.types import Contact, Options, Recognition, Rung
 
 Render = Callable[[Contact, Recognition], bytes]  # -> PNG
+
+
+class LadderRung(Protocol):
+    """One rung of a pipeline's ladder and its stages."""
+
+    @property
+    def name(self) -> Rung:
+        """As answers tell it."""
+        ...
+
+    @property
+    def stages(self) -> Sequence[Stage[Any]]:
+        """In their order."""
+        ...
 
 
 @runtime_checkable  # so that shape-checked tests can check it
@@ -28,12 +45,16 @@ class PipelineLike(Protocol):
         """In the order of the data path."""
         ...
 
+    def ladder(self, options: Options) -> Sequence[LadderRung]:
+        """The rungs that the caller accepts, the best first."""
+        ...
+
     def begin(self, contact: Contact, options: Options) -> Any:
         """The work item; raises InvalidInput when the points cannot be one vessel's cluster."""
         ...
 
-    def finish(self, work: Any, stage_ms: Mapping[str, float]) -> Recognition:
-        """The answer, once every stage ran."""
+    def finish(self, work: Any, stage_ms: Mapping[str, float], rung: Rung, rung_reason: str) -> Recognition:
+        """The answer, once every stage of the rung ran."""
         ...
 
 
@@ -87,8 +108,13 @@ def conclude(scan: Scan, door: str, metrics: Metrics) -> tuple[list[Answer | Fau
         DeadlineExceeded, Cancelled, NotReady: As `Scan.outcomes`.
     """
     outcomes = [fault_of(end) if isinstance(end, Exception) else end for end in scan.outcomes()]
-    metrics.count_contacts(door, (end.kind if isinstance(end, Fault) else OK for end in outcomes))
+    metrics.count_contacts(door, (end.kind if isinstance(end, Fault) else outcome_of(end) for end in outcomes))
     return outcomes, summed(end.recognition for end in outcomes if not isinstance(end, Fault))
+
+
+def outcome_of(answer: Answer) -> str:
+    """How metrics call it: ok, or degraded when it is of a lower rung."""
+    return OK if answer.recognition.rung is Rung.FULL else DEGRADED
 
 
 class Core:
@@ -98,23 +124,43 @@ class Core:
         executor: Carries the stages.
         limits: What one request may bring.
         render: Draws the picture of an answer.
+        on_age: Told how old the points of a request are, seconds, when the caller says it.
     """
 
-    def __init__(self, executor: Executor, limits: Limits, render: Render) -> None:
+    def __init__(
+        self,
+        executor: Executor,
+        limits: Limits,
+        render: Render,
+        *,
+        on_age: Callable[[float], None] = lambda seconds: None,
+    ) -> None:
         self.limits = limits
         self._executor = executor
         self._render = render
+        self._on_age = on_age
         self._model: Model | None = None
         self._refusal = "expected a running service, got one that is still starting"
 
     @property
     def ready(self) -> bool:
-        """Whether requests are taken."""
-        return self._model is not None
+        """Whether requests are taken, and computed: no worker is dead or stuck."""
+        return self._model is not None and self._executor.sound
 
     def open(self, model: Model) -> None:
         """Take requests from now on, answered by `model`."""
         self._model = model
+
+    def rehearse(self, model: Model, contact: Contact) -> None:
+        """Run a contact on every rung, so that their costs are known before the first request.
+
+        Raises:
+            Exception: Whatever a stage raises.
+        """
+        for rung in (*Rung, *Rung):
+            wishes = Wishes(Options(lowest_rung=rung))
+            task = self._task(model, contact, wishes, math.inf)
+            self._executor.rehearse(replace(task, ladder=task.ladder[-1:]))
 
     def close(self) -> None:
         """Take no more requests; those under way go on."""
@@ -148,7 +194,7 @@ class Core:
             InvalidInput: Another bundle than the running one, or points that cannot be one vessel's cluster.
             Overloaded, DeadlineExceeded, NotReady: No place, no time, or stopped for good.
         """
-        self._check(model, wishes, deadline)
+        deadline = self._check(model, wishes, deadline)
         return self._executor.submit(self._task(model, contact, wishes, deadline))
 
     def submit_scan(
@@ -166,7 +212,7 @@ class Core:
             InvalidInput, Overloaded, DeadlineExceeded, NotReady: What concerns the scan as a whole.
         """
         check_contacts(len(contacts), self.limits)
-        self._check(model, wishes, deadline)
+        deadline = self._check(model, wishes, deadline)
         entries: list[Task[Any, Answer] | Exception] = []
         for contact in contacts:
             try:
@@ -178,20 +224,37 @@ class Core:
         tickets = iter(self._executor.submit_all([entry for entry in entries if isinstance(entry, Task)]))
         return Scan([next(tickets) if isinstance(entry, Task) else entry for entry in entries])
 
-    def _check(self, model: Model, wishes: Wishes, deadline: float) -> None:
+    def _check(self, model: Model, wishes: Wishes, deadline: float) -> float:
+        """The moment at which the answer must be there."""
         if wishes.bundle not in ("", model.bundle.name, model.bundle.digest):
             expected = f"{model.bundle.name} ({model.bundle.digest})"
             raise InvalidInput(f"expected bundle {expected}, got {wishes.bundle:.80}")
         if self._executor.clock() >= deadline:
             raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
+        return self._in_time(wishes, deadline)
+
+    def _in_time(self, wishes: Wishes, deadline: float) -> float:
+        """The deadline, or the earlier moment at which what the LiDAR saw will be too old."""
+        if (age := age_of(wishes, time.time())) is None:
+            return deadline
+        self._on_age(age)
+        return min(deadline, self._executor.clock() + time_left(age, wishes))
 
     def _task(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Task[Any, Answer]:
-        def finish(work: Any, stage_ms: Mapping[str, float]) -> Answer:
-            recognition = model.pipeline.finish(work, stage_ms)
+        def finish(work: Any, ended: Ended) -> Answer:
+            """On the worker: drawing a picture takes as long as the recognition."""
+            recognition = model.pipeline.finish(work, ended.stage_ms, Rung(ended.rung), ended.why)
             png = self._render(contact, recognition) if wishes.png else None
             return Answer(contact, recognition, png)
 
-        return Task(model.pipeline.stages, model.pipeline.begin(contact, wishes.options), finish, deadline)
+        return Task(
+            model.pipeline.ladder(wishes.options),
+            model.pipeline.begin(contact, wishes.options),
+            finish,
+            deadline,
+            wishes.lane,
+            size=len(contact.points_level),
+        )
 
 
 def _outcome(entry: Ticket[Answer] | Exception) -> Answer | Exception:

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from shipshape.errors import InvalidInput, TooLarge
+from shipshape.executor import Lane
 from shipshape.types import Contact, Options
 
 POINT_BYTES = 12
@@ -36,10 +37,26 @@ class Wishes:
     """How a caller wants its contacts computed, and what it wants in the answer."""
 
     options: Options = field(default_factory=Options)
+    lane: Lane = Lane.TRACKING
+    captured_at: float | None = None  # seconds since 1970 (UTC) at which the LiDAR saw the contacts
+    max_age_s: float | None = None  # an answer is worth nothing when what it tells is older; needs captured_at
     bundle: str = ""  # name or digest that the caller insists on; empty: whichever runs
     restored: bool = False
     images: bool = False
     png: bool = False
+
+
+def make_wishes(*, captured_at: float | None, max_age_ms: float | None, **wishes: Any) -> Wishes:
+    """Wishes; the others as they are.
+
+    Raises:
+        InvalidInput: A moment or an age that is no number, or an age that is not above 0.
+    """
+    if captured_at is not None and not math.isfinite(captured_at):
+        raise InvalidInput(f"expected captured_at in seconds since 1970, got {captured_at}")
+    if max_age_ms is not None and not 0 < max_age_ms < math.inf:
+        raise InvalidInput(f"expected max_age_ms above 0, got {max_age_ms}")
+    return Wishes(captured_at=captured_at, max_age_s=None if max_age_ms is None else max_age_ms / 1e3, **wishes)
 
 
 def points_from_bytes(packed: bytes, limits: Limits) -> Float32[np.ndarray, "n 3"]:

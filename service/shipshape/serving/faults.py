@@ -40,6 +40,7 @@ class Fault:
 
     kind: FaultKind
     message: str
+    retry_after_s: float | None = None  # when the caller may come back; only of what is overloaded
 
 
 # The first class that fits; an error that is not listed tells the caller nothing but an id.
@@ -58,7 +59,7 @@ def fault_of(error: BaseException) -> Fault:
     """What the caller is told of `error`; one that was not meant is logged with its traceback and an id."""
     for known, kind in _KINDS:
         if isinstance(error, known):
-            return Fault(kind, str(error))
+            return Fault(kind, str(error), getattr(error, "retry_after_s", None))
     incident = uuid.uuid4().hex[:12]
     _logger.error("internal error %s", incident, exc_info=error)
     return Fault(FaultKind.INTERNAL, f"expected an answer, got an internal error; its id in the log is {incident}")

@@ -14,6 +14,7 @@ from prometheus_client import CollectorRegistry
 
 from shipshape.errors import Cancelled
 from shipshape.executor import Executor, usable_cores
+from shipshape.sample import sample_contact
 from shipshape.serving.core import Core, Model, Render
 from shipshape.serving.encoding import Limits
 from shipshape.serving.grpc.server import GrpcDoor
@@ -62,9 +63,16 @@ class Service:
         self._stopping = False
         self._render = render
         self._metrics = Metrics(CollectorRegistry())
-        self.executor = Executor(workers, settings.queue_limit, on_stage=self._metrics.observe_stage)
-        self._metrics.watch_queue(lambda: self.executor.queue_depth, lambda: self.executor.running)
-        self._core = Core(self.executor, limits, render)
+        self.executor = Executor(
+            workers,
+            settings.queue_limit,
+            on_stage=self._metrics.observe_stage,
+            on_wait=self._metrics.observe_wait,
+        )
+        self._metrics.watch_queue(
+            lambda: self.executor.queue_depth, lambda: self.executor.queue_age, lambda: self.executor.running
+        )
+        self._core = Core(self.executor, limits, render, on_age=self._metrics.observe_age)
         self._grpc = GrpcDoor(self._core, self._metrics, timeouts, waiting=settings.queue_limit + workers)
         self._rest = RestDoor(build_app(self._core, self._metrics, timeouts), on_death=on_death)
 
@@ -86,6 +94,7 @@ class Service:
             Exception: Whatever the warm-up raises.
         """
         warm_up(model, self._render, lambda: self._stopping)
+        self._core.rehearse(model, sample_contact())
         with self._turn:
             if self._stopping:
                 raise Cancelled("expected to take requests after the warm-up, got a signal to stop")

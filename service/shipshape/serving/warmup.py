@@ -5,7 +5,7 @@ from collections.abc import Callable
 from shipshape.errors import Cancelled
 from shipshape.sample import sample_contact
 from shipshape.serving.core import Model, Render
-from shipshape.types import Contact, ImageMethod, Options, Preset, Recognition
+from shipshape.types import Contact, ImageMethod, Options, Preset, Recognition, Rung
 
 
 def warm_up(model: Model, render: Render, stopping: Callable[[], bool]) -> None:
@@ -28,4 +28,4 @@ def _run(model: Model, contact: Contact, options: Options, stopping: Callable[[]
         if stopping():
             raise Cancelled("expected to end the warm-up, got a signal to stop")
         stage.run(work)
-    return model.pipeline.finish(work, {})
+    return model.pipeline.finish(work, {}, Rung.FULL, "")

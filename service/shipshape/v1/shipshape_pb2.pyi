@@ -21,6 +21,20 @@ class ImageMethod(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     IMAGE_METHOD_Z_TOP: _ClassVar[ImageMethod]
     IMAGE_METHOD_Z_SIDE: _ClassVar[ImageMethod]
 
+class Lane(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    LANE_UNSPECIFIED: _ClassVar[Lane]
+    LANE_COLLISION: _ClassVar[Lane]
+    LANE_TRACKING: _ClassVar[Lane]
+    LANE_BATCH: _ClassVar[Lane]
+
+class Rung(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    RUNG_UNSPECIFIED: _ClassVar[Rung]
+    RUNG_FULL: _ClassVar[Rung]
+    RUNG_WITHOUT_RESTORATION: _ClassVar[Rung]
+    RUNG_HEADING_AND_BOX: _ClassVar[Rung]
+
 class Reason(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     REASON_UNSPECIFIED: _ClassVar[Reason]
@@ -49,6 +63,14 @@ IMAGE_METHOD_FULL_TOP: ImageMethod
 IMAGE_METHOD_FULL_SIDE: ImageMethod
 IMAGE_METHOD_Z_TOP: ImageMethod
 IMAGE_METHOD_Z_SIDE: ImageMethod
+LANE_UNSPECIFIED: Lane
+LANE_COLLISION: Lane
+LANE_TRACKING: Lane
+LANE_BATCH: Lane
+RUNG_UNSPECIFIED: Rung
+RUNG_FULL: Rung
+RUNG_WITHOUT_RESTORATION: Rung
+RUNG_HEADING_AND_BOX: Rung
 REASON_UNSPECIFIED: Reason
 REASON_FEW_POINTS: Reason
 REASON_END_ON: Reason
@@ -78,20 +100,28 @@ class Contact(_message.Message):
     def __init__(self, contact_id: _Optional[str] = ..., points: _Optional[bytes] = ..., sensor_height_m: _Optional[float] = ..., own_true_heading_deg: _Optional[float] = ...) -> None: ...
 
 class Options(_message.Message):
-    __slots__ = ("preset", "image_method", "bundle", "include_restored", "include_images", "include_png")
+    __slots__ = ("preset", "image_method", "bundle", "include_restored", "include_images", "include_png", "lane", "lowest_rung", "captured_at", "max_age_ms")
     PRESET_FIELD_NUMBER: _ClassVar[int]
     IMAGE_METHOD_FIELD_NUMBER: _ClassVar[int]
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_RESTORED_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_IMAGES_FIELD_NUMBER: _ClassVar[int]
     INCLUDE_PNG_FIELD_NUMBER: _ClassVar[int]
+    LANE_FIELD_NUMBER: _ClassVar[int]
+    LOWEST_RUNG_FIELD_NUMBER: _ClassVar[int]
+    CAPTURED_AT_FIELD_NUMBER: _ClassVar[int]
+    MAX_AGE_MS_FIELD_NUMBER: _ClassVar[int]
     preset: Preset
     image_method: ImageMethod
     bundle: str
     include_restored: bool
     include_images: bool
     include_png: bool
-    def __init__(self, preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., include_restored: _Optional[bool] = ..., include_images: _Optional[bool] = ..., include_png: _Optional[bool] = ...) -> None: ...
+    lane: Lane
+    lowest_rung: Rung
+    captured_at: float
+    max_age_ms: float
+    def __init__(self, preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., include_restored: _Optional[bool] = ..., include_images: _Optional[bool] = ..., include_png: _Optional[bool] = ..., lane: _Optional[_Union[Lane, str]] = ..., lowest_rung: _Optional[_Union[Rung, str]] = ..., captured_at: _Optional[float] = ..., max_age_ms: _Optional[float] = ...) -> None: ...
 
 class RecogniseRequest(_message.Message):
     __slots__ = ("contact", "options")
@@ -140,7 +170,7 @@ class ContactError(_message.Message):
     def __init__(self, kind: _Optional[_Union[ErrorKind, str]] = ..., message: _Optional[str] = ...) -> None: ...
 
 class Recognition(_message.Message):
-    __slots__ = ("contact_id", "vessel", "probability", "probabilities", "unknown", "heading", "heading_std", "bow_probability", "aspect_deg", "true_heading_deg", "box", "measured_points", "inferred_points", "keypoints", "rung", "preset", "image_method", "bundle", "stages", "restored", "images", "rendered_png", "reasons")
+    __slots__ = ("contact_id", "vessel", "probability", "probabilities", "unknown", "heading", "heading_std", "bow_probability", "aspect_deg", "true_heading_deg", "box", "measured_points", "inferred_points", "keypoints", "rung", "preset", "image_method", "bundle", "stages", "restored", "images", "rendered_png", "reasons", "rung_reason")
     CONTACT_ID_FIELD_NUMBER: _ClassVar[int]
     VESSEL_FIELD_NUMBER: _ClassVar[int]
     PROBABILITY_FIELD_NUMBER: _ClassVar[int]
@@ -164,6 +194,7 @@ class Recognition(_message.Message):
     IMAGES_FIELD_NUMBER: _ClassVar[int]
     RENDERED_PNG_FIELD_NUMBER: _ClassVar[int]
     REASONS_FIELD_NUMBER: _ClassVar[int]
+    RUNG_REASON_FIELD_NUMBER: _ClassVar[int]
     contact_id: str
     vessel: str
     probability: float
@@ -187,7 +218,8 @@ class Recognition(_message.Message):
     images: ImagePair
     rendered_png: bytes
     reasons: _containers.RepeatedScalarFieldContainer[Reason]
-    def __init__(self, contact_id: _Optional[str] = ..., vessel: _Optional[str] = ..., probability: _Optional[float] = ..., probabilities: _Optional[_Iterable[_Union[NamedProbability, _Mapping]]] = ..., unknown: _Optional[bool] = ..., heading: _Optional[float] = ..., heading_std: _Optional[float] = ..., bow_probability: _Optional[float] = ..., aspect_deg: _Optional[float] = ..., true_heading_deg: _Optional[float] = ..., box: _Optional[_Union[Box, _Mapping]] = ..., measured_points: _Optional[int] = ..., inferred_points: _Optional[int] = ..., keypoints: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., rung: _Optional[str] = ..., preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., restored: _Optional[_Union[RestoredCloud, _Mapping]] = ..., images: _Optional[_Union[ImagePair, _Mapping]] = ..., rendered_png: _Optional[bytes] = ..., reasons: _Optional[_Iterable[_Union[Reason, str]]] = ...) -> None: ...
+    rung_reason: str
+    def __init__(self, contact_id: _Optional[str] = ..., vessel: _Optional[str] = ..., probability: _Optional[float] = ..., probabilities: _Optional[_Iterable[_Union[NamedProbability, _Mapping]]] = ..., unknown: _Optional[bool] = ..., heading: _Optional[float] = ..., heading_std: _Optional[float] = ..., bow_probability: _Optional[float] = ..., aspect_deg: _Optional[float] = ..., true_heading_deg: _Optional[float] = ..., box: _Optional[_Union[Box, _Mapping]] = ..., measured_points: _Optional[int] = ..., inferred_points: _Optional[int] = ..., keypoints: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., rung: _Optional[str] = ..., preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., restored: _Optional[_Union[RestoredCloud, _Mapping]] = ..., images: _Optional[_Union[ImagePair, _Mapping]] = ..., rendered_png: _Optional[bytes] = ..., reasons: _Optional[_Iterable[_Union[Reason, str]]] = ..., rung_reason: _Optional[str] = ...) -> None: ...
 
 class NamedProbability(_message.Message):
     __slots__ = ("name", "probability")

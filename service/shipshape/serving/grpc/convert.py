@@ -8,10 +8,19 @@ import numpy as np
 from jaxtyping import UInt8
 
 from shipshape.errors import InvalidInput
+from shipshape.executor import Lane
 from shipshape.serving.core import Answer, Model
-from shipshape.serving.encoding import Limits, Wishes, flat_scores, make_contact, pack, points_from_bytes
+from shipshape.serving.encoding import (
+    Limits,
+    Wishes,
+    flat_scores,
+    make_contact,
+    make_wishes,
+    pack,
+    points_from_bytes,
+)
 from shipshape.serving.faults import Fault, FaultKind
-from shipshape.types import Box, Contact, ImageMethod, Options, Preset, Reason, RestoredCloud
+from shipshape.types import Box, Contact, ImageMethod, Options, Preset, Reason, RestoredCloud, Rung
 from shipshape.v1 import shipshape_pb2 as pb
 
 T = TypeVar("T", bound=StrEnum)
@@ -22,6 +31,12 @@ IMAGE_METHODS = {
     pb.IMAGE_METHOD_FULL_SIDE: ImageMethod.FULL_SIDE,
     pb.IMAGE_METHOD_Z_TOP: ImageMethod.Z_TOP,
     pb.IMAGE_METHOD_Z_SIDE: ImageMethod.Z_SIDE,
+}
+LANES = {pb.LANE_COLLISION: Lane.COLLISION, pb.LANE_TRACKING: Lane.TRACKING, pb.LANE_BATCH: Lane.BATCH}
+RUNGS = {
+    pb.RUNG_FULL: Rung.FULL,
+    pb.RUNG_WITHOUT_RESTORATION: Rung.WITHOUT_RESTORATION,
+    pb.RUNG_HEADING_AND_BOX: Rung.HEADING_AND_BOX,
 }
 REASONS = {reason: f"REASON_{reason.name}" for reason in Reason}
 ERROR_KINDS = {kind: f"ERROR_KIND_{kind.name}" for kind in FaultKind}
@@ -54,15 +69,19 @@ def to_wishes(message: pb.Options) -> Wishes:
     """The wishes of a message.
 
     Raises:
-        InvalidInput: A preset or image method that the contract does not number.
+        InvalidInput: A number that the contract does not know, or an age that cannot be.
     """
-    preset, method = Options().preset, Options().image_method
-    if message.preset != pb.PRESET_UNSPECIFIED:
-        preset = _numbered(PRESETS, message.preset, "preset")
-    if message.image_method != pb.IMAGE_METHOD_UNSPECIFIED:
-        method = _numbered(IMAGE_METHODS, message.image_method, "image_method")
-    return Wishes(
-        options=Options(preset, method),
+    usual = Options()
+    options = Options(
+        _numbered(PRESETS, message.preset, "preset", usual.preset),
+        _numbered(IMAGE_METHODS, message.image_method, "image_method", usual.image_method),
+        _numbered(RUNGS, message.lowest_rung, "lowest_rung", usual.lowest_rung),
+    )
+    return make_wishes(
+        options=options,
+        lane=_numbered(LANES, message.lane, "lane", Lane.TRACKING),
+        captured_at=message.captured_at if message.HasField("captured_at") else None,
+        max_age_ms=message.max_age_ms if message.HasField("max_age_ms") else None,
         bundle=message.bundle,
         restored=message.include_restored,
         images=message.include_images,
@@ -90,6 +109,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
         inferred_points=found.inferred_points,
         keypoints=[pb.Point(x=x, y=y, z=z) for x, y, z in found.keypoints_level.tolist()],
         rung=found.rung,
+        rung_reason=found.rung_reason,
         preset=_PRESET_NUMBERS[found.preset],
         image_method=_IMAGE_METHOD_NUMBERS[found.image_method] if found.image_method else None,
         bundle=found.bundle,
@@ -98,7 +118,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
     )
     if wishes.restored:
         message.restored.CopyFrom(_restored(found.restored))
-    if wishes.images:
+    if wishes.images and found.images is not None:
         images = pb.ImagePair(before=_image(found.images.before), after=_image(found.images.after))
         message.images.CopyFrom(images)
     return message
@@ -151,7 +171,9 @@ def _image(image: UInt8[np.ndarray, "rows columns channels"]) -> pb.Image:
     return pb.Image(rows=rows, columns=columns, channels=channels, values=image.tobytes())
 
 
-def _numbered(table: Mapping[Any, T], number: int, what: str) -> T:
+def _numbered(table: Mapping[Any, T], number: int, what: str, unspecified: T) -> T:
+    if number == 0:
+        return unspecified
     if number not in table:
         raise InvalidInput(f"expected {what} to be one of {', '.join(table.values())}, got number {number}")
     return table[number]

@@ -1,5 +1,6 @@
 """What every RPC of shipshape.v1 passes: limits, parsing, metrics, request id, and the one table of errors."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -8,8 +9,9 @@ from google.protobuf.message import DecodeError
 
 from shipshape.errors import InvalidInput
 from shipshape.serving.encoding import Limits, check_body
-from shipshape.serving.faults import FaultKind, fault_of
-from shipshape.telemetry import SCAN, SINGLE, Metrics, new_request_id, request_id
+from shipshape.serving.faults import Fault, FaultKind, fault_of
+from shipshape.telemetry import DEGRADED, SCAN, SINGLE, Metrics, new_request_id, request_id
+from shipshape.types import Rung
 
 STATUS = {
     FaultKind.INVALID_INPUT: grpc.StatusCode.INVALID_ARGUMENT,
@@ -54,12 +56,15 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     message = _parsed(raw, parse)
                     if method == SCAN:
                         outcome.contacts = len(message.contacts)
-                    return behaviour(message, context)
+                    response = behaviour(message, context)
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
-                    set_trailing(context, ("shipshape-error", fault.kind))
+                    set_trailing(context, ("shipshape-error", fault.kind), *_pushback(fault))
                     _abort(context, STATUS[fault.kind], fault.message)
+                if method == SINGLE and response.recognition.rung != Rung.FULL:
+                    outcome.kind = DEGRADED
+                return response
 
         return call
 
@@ -67,6 +72,13 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str]) -> None:
     """Trailing metadata: `entries` and the request's id."""
     context.set_trailing_metadata((*entries, ("x-request-id", request_id.get())))
+
+
+def _pushback(fault: Fault) -> tuple[tuple[str, str], ...]:
+    """When clients with a retry policy shall come back; theirs is ignored then."""
+    if fault.retry_after_s is None:
+        return ()
+    return (("grpc-retry-pushback-ms", str(math.ceil(fault.retry_after_s * 1e3))),)
 
 
 def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:

@@ -44,6 +44,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> Json:
         "inferred_points": found.inferred_points,
         "keypoints": np.ascontiguousarray(found.keypoints_level),
         "rung": found.rung,
+        "rung_reason": found.rung_reason,
         "preset": found.preset,
         "image_method": found.image_method,
         "bundle": found.bundle,
@@ -51,7 +52,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> Json:
     }
     if wishes.restored:
         value["restored"] = _restored(found.restored)
-    if wishes.images:
+    if wishes.images and found.images is not None:
         value["images"] = _images(found.images)
     if answer.png is not None:
         value["rendered_png"] = _base64(answer.png)

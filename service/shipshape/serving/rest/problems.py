@@ -1,5 +1,6 @@
 """The one table of errors of the REST door, and RFC 9457 problem documents."""
 
+import math
 from http import HTTPStatus
 
 import orjson
@@ -22,6 +23,7 @@ STATUS = {
 }
 MEDIA_TYPE = "application/problem+json"
 ID_HEADER = "X-Request-Id"
+RETRY_HEADER = "Shipshape-Retry-After-Ms"  # beside Retry-After, which knows whole seconds only
 
 
 def identify(request: Request) -> str:
@@ -34,7 +36,11 @@ def identify(request: Request) -> str:
 def problem(fault: Fault) -> Response:
     """The problem document of a fault."""
     title = fault.kind.replace("_", " ").capitalize()
-    return _document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
+    response = _document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
+    if fault.retry_after_s is not None:
+        response.headers["Retry-After"] = str(max(1, math.ceil(fault.retry_after_s)))  # whole seconds, by its RFC
+        response.headers[RETRY_HEADER] = str(math.ceil(fault.retry_after_s * 1e3))
+    return response
 
 
 def add_handlers(app: FastAPI) -> None:

@@ -13,6 +13,7 @@ from shipshape.serving.encoding import (
     Wishes,
     check_contacts,
     make_contact,
+    make_wishes,
     points_from_base64,
     points_from_bytes,
     points_from_rows,
@@ -134,8 +135,11 @@ def _contact(fields: ContactFields, points_level: Any) -> Contact:
 
 
 def _wishes(fields: OptionsFields) -> Wishes:
-    return Wishes(
-        options=Options(fields.preset, fields.image_method),
+    return make_wishes(
+        options=Options(fields.preset, fields.image_method, fields.lowest_rung),
+        lane=fields.lane,
+        captured_at=fields.captured_at,
+        max_age_ms=fields.max_age_ms,
         bundle=fields.bundle,
         restored=fields.include_restored,
         images=fields.include_images,

@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from shipshape.errors import NotReady
 from shipshape.executor import Ticket
-from shipshape.serving.core import Answer, Core, Scan, conclude
+from shipshape.serving.core import Answer, Core, Scan, conclude, outcome_of
 from shipshape.serving.encoding import Wishes
 from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.rest import answers
@@ -88,7 +88,7 @@ class Routes:
         response.headers[ID_HEADER] = given
         return response
 
-    async def _recognise(self, request: Request, _: Outcome) -> Response:
+    async def _recognise(self, request: Request, outcome: Outcome) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
         parse = parse_packed if media_type(request, JSON, PACKED) == PACKED else parse_json
         deadline = self._core.deadline_in(seconds)
@@ -100,7 +100,9 @@ class Routes:
 
             ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         await until_settled([ticket], request)
-        return await _run(lambda: _single(ticket, wishes), small=not _bulky(wishes))
+        answer = ticket.result()
+        outcome.kind = outcome_of(answer)
+        return await _run(lambda: _single(answer, wishes), small=not _bulky(wishes))
 
     async def _scan(self, request: Request, outcome: Outcome) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
@@ -140,8 +142,7 @@ def _bulky(wishes: Wishes) -> bool:
     return wishes.restored or wishes.images or wishes.png
 
 
-def _single(ticket: Ticket[Answer], wishes: Wishes) -> Response:
-    answer = ticket.result()
+def _single(answer: Answer, wishes: Wishes) -> Response:
     timing = server_timing(answer.recognition.stage_ms)
     return _json(answers.to_bytes(answers.from_answer(answer, wishes)), timing)
 

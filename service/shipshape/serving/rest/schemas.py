@@ -4,7 +4,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
-from shipshape.types import ImageMethod, Preset, Reason
+from shipshape.executor import Lane
+from shipshape.types import ImageMethod, Preset, Reason, Rung
 
 Points = Annotated[
     Any,  # checked by `encoding.points_from_rows`: a validator a number would cost more than the recognition
@@ -38,6 +39,20 @@ class OptionsFields(_Asked):
     include_restored: bool = Field(False, description="Put the whole vessel's points into the answer.")
     include_images: bool = Field(False, description="Put the images before and after inpainting into it.")
     include_png: bool = Field(False, description="Put a picture for people into it.")
+    lane: Lane = Field(
+        Lane.TRACKING, strict=False, description="What it is for: who goes first when workers are short."
+    )
+    lowest_rung: Rung = Field(
+        Rung.HEADING_AND_BOX,
+        strict=False,
+        description="The cheapest answer that is better than none; full forbids all others.",
+    )
+    captured_at: float | None = Field(
+        None, description="When the LiDAR saw the contacts, seconds since 1970-01-01 UTC."
+    )
+    max_age_ms: float | None = Field(
+        None, description="Needs captured_at: an answer about what is older is worth nothing, milliseconds."
+    )
 
 
 class ContactFields(_Asked):
@@ -132,15 +147,16 @@ class RecognitionAnswer(BaseModel):
         description="Points of the restored cloud that were measured: those that the sensor saw; preset paper: "
         "one a filled pixel."
     )
-    inferred_points: int = Field(description="Points of the restored cloud that were inferred.")
-    keypoints: list[Triple] = Field(description="The points described for classification; metres, level.")
-    rung: str = Field(description="Rung of the ladder of ever cheaper answers; full is the top.")
+    inferred_points: int = Field(description="Those that were inferred; none below rung full.")
+    keypoints: list[Triple] = Field(description="Described for classification; metres, level; none below full.")
+    rung: Rung = Field(description="Of the ladder of ever cheaper answers; full is the top.")
+    rung_reason: str = Field(description="Why rung is not full: one sentence; empty when it is.")
     preset: Preset
     image_method: ImageMethod | None = Field(description="null: the image of preset best.")
     bundle: str = Field(description="sha256 of the model bundle.")
     stage_ms: dict[str, float] = Field(description="Milliseconds of each stage.")
     restored: RestoredAnswer | None = Field(None, description="Only with include_restored.")
-    images: ImagesAnswer | None = Field(None, description="Only with include_images.")
+    images: ImagesAnswer | None = Field(None, description="Only with include_images, on rung full.")
     rendered_png: str | None = Field(None, description="Base64; only with include_png.")
 
 

@@ -1,0 +1,53 @@
+"""Yes or no to new work, at once: will it end in time behind all that stands before it, and on which rung?"""
+
+from collections.abc import Sequence
+
+from shipshape.errors import DeadlineExceeded, Overloaded
+from shipshape.executor.costs import Costs
+from shipshape.executor.entry import Entry, why_cheaper
+
+HEADROOM = 1.25  # over the predicted time: costs are means, and half of all work takes longer
+
+
+def settle_rungs(entries: Sequence[Entry], costs: Costs, *, wait: float, slack: float, workers: int) -> None:
+    """Put all entries of one request on the dearest place of their ladders that will end in time.
+
+    Args:
+        entries: At least one.
+        costs: Of their stages.
+        wait: Seconds until a worker will be free for the first of them; 0 when nothing stands before them.
+        slack: Seconds until their deadline.
+        workers: That share them.
+
+    Raises:
+        DeadlineExceeded: Not even alone would they end in time.
+        Overloaded: They would, but for what stands before them; says when to come back.
+    """
+    needed = full = 0.0
+    for place in range(max(len(entry.task.ladder) for entry in entries)):
+        alone = _seconds(entries, costs, place, workers)
+        needed = wait + alone
+        full = full or needed
+        if HEADROOM * needed <= slack:
+            break
+    else:
+        if wait > 0:  # with nobody before it, let it try: costs are learned from what runs
+            _refuse(alone, needed, slack)
+    for entry in entries:
+        entry.move_to(place, costs, why_cheaper(full, slack))
+
+
+def _seconds(entries: Sequence[Entry], costs: Costs, place: int, workers: int) -> float:
+    each = [entry.expected(place, costs) for entry in entries]
+    return max(*each, sum(each) / workers)
+
+
+def _refuse(alone: float, needed: float, slack: float) -> None:
+    if HEADROOM * alone > slack:
+        raise DeadlineExceeded(
+            f"expected at least {HEADROOM * alone * 1e3:.1f} ms for an answer, got {slack * 1e3:.1f} ms"
+        )
+    raise Overloaded(
+        f"expected {HEADROOM * needed * 1e3:.0f} ms for an answer behind all that waits, got {slack * 1e3:.0f} ms",
+        retry_after_s=HEADROOM * needed - slack,
+    )
