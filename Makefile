@@ -62,7 +62,7 @@ LOCK = UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --uni
 
 lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
 	@$(LOCK) pyproject.toml requirements/build.in --output-file requirements/service.lock
-	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in \
+	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest \
 	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
 
 # A stamp is older than its lock only when the lock changed: the second time, nothing is asked of the network.

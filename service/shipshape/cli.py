@@ -1,7 +1,8 @@
-"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR.
+"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR | loadtest TARGET.
 
 Exit codes: 0 all went well; 1 a cluster or file was refused, or the service failed; 2 the command, a setting
-or the bundle is wrong.
+or the bundle is wrong. Of loadtest: 0 the budget was held; 1 it was not; 2 as above, or no target; 3 the tool was
+too slow to tell.
 """
 
 import argparse
@@ -34,6 +35,21 @@ files (metres, level frame: origin at the LiDAR, x ahead, y to port, z up):
   measured_points, inferred_points, rung, bundle, stage_ms
   true_heading_deg      only with --own-heading; clockwise from north
   or file, index (null: the whole file) and error for what is refused
+"""
+
+_LOADTEST_NOTES = """\
+examples:
+  shipshape loadtest grpc://127.0.0.1:50051 --budget p99=50ms --rate 300
+  shipshape loadtest http://127.0.0.1:8080 --sweep --report sweep.html
+  shipshape loadtest oip+http://127.0.0.1:8080/shipshape --points 50=2,300=8,2000
+
+targets:
+  grpc[s]://HOST:PORT             shipshape.v1
+  http[s]://HOST:PORT             REST
+  oip+http[s]://HOST:PORT/MODEL   Open Inference Protocol v2: any server that takes `points` and `counts`
+
+exit codes: 0 the budget was held, 1 it was not, 2 wrong command or no target, 3 the tool was too slow to tell
+times are written as 50ms, 2s or 1m
 """
 
 
@@ -70,6 +86,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_classify(commands)
     _add_check(commands)
     _add_bundle(commands)
+    _add_loadtest(commands)
     return parser
 
 
@@ -131,6 +148,58 @@ def _add_bundle(commands: _Commands) -> None:
     verify = _add(actions, "verify", summary, "example:\n  shipshape bundle verify models")
     verify.set_defaults(command="bundle verify")
     verify.add_argument("folder", type=Path, metavar="DIR")
+
+
+def _add_loadtest(commands: _Commands) -> None:
+    parser = _add(commands, "loadtest", "test whether a running service holds a latency budget", _LOADTEST_NOTES)
+    parser.set_defaults(command="loadtest")
+    parser.add_argument("target", metavar="TARGET", help="see below")
+    parser.add_argument(
+        "--budget", default="p99=50ms", help="share of requests and their limit (default: %(default)s)"
+    )
+    parser.add_argument("--rate", type=float, metavar="N", help="contacts a second (default: 100, or as recorded)")
+    parser.add_argument("--sweep", action="store_true", help="find the highest rate that holds, from --rate on")
+    parser.add_argument(
+        "--step", default="5s", metavar="TIME", help="of each rate of a sweep (default: %(default)s)"
+    )
+    parser.add_argument("--duration", default="30s", metavar="TIME", help="of what counts (default: %(default)s)")
+    parser.add_argument(
+        "--warmup", default="3s", metavar="TIME", help="sent before, not counted (default: %(default)s)"
+    )
+    _add_load_options(parser)
+    parser.add_argument("--ca", type=Path, metavar="PEM", help="who signed the target's certificate")
+    parser.add_argument("--cert", type=Path, metavar="PEM", help="own certificate, for a target that asks for one")
+    parser.add_argument("--key", type=Path, metavar="PEM", help="its key")
+    parser.add_argument("--token-file", type=Path, metavar="FILE", help="holds the bearer token")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers there")
+    parser.add_argument("--report", type=Path, metavar="FILE", help="write a page with plots there")
+
+
+def _add_load_options(parser: argparse.ArgumentParser) -> None:
+    load = parser.add_argument_group("what is sent")
+    load.add_argument(
+        "--arrivals", default="poisson", help="poisson, constant, bursts:N, or a .csv of seconds,contacts"
+    )
+    load.add_argument(
+        "--contacts", type=int, default=1, metavar="N", help="of each request (default: %(default)s)"
+    )
+    load.add_argument(
+        "--points", metavar="LIST", help="of a contact, with weights: 50=2,300=8,2000 (default: 300)"
+    )
+    load.add_argument("--clusters", type=Path, metavar="FILE", help="to cut contacts from (default: built in)")
+    load.add_argument("--deadline", metavar="TIME", help="of each request (default: the budget's limit)")
+    load.add_argument(
+        "--connections", type=int, default=4, metavar="N", help="of a process (default: %(default)s)"
+    )
+    load.add_argument("--processes", type=int, default=1, metavar="N", help="that send (default: %(default)s)")
+    load.add_argument(
+        "--max-outstanding",
+        type=int,
+        default=10_000,
+        metavar="N",
+        help="beyond, nothing is sent (default: %(default)s)",
+    )
+    load.add_argument("--seed", type=int, default=0, help="of all that is drawn (default: %(default)s)")
 
 
 def _add_bundle_option(parser: argparse.ArgumentParser) -> None:

@@ -88,11 +88,24 @@ def verify(arguments: argparse.Namespace) -> int:
     return OK
 
 
+def loadtest(arguments: argparse.Namespace) -> int:
+    """Test a running service as its client."""
+    try:
+        # Only now: its libraries come with an extra, and no other command needs them.
+        from shipshape.loadtest.command import loadtest as run  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise SettingsError(
+            f"expected the libraries of the extra shipshape[loadtest] to be installed, got no {error.name}"
+        ) from error
+    return run(arguments)
+
+
 COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "serve": serve,
     "classify": classify,
     "check": check,
     "bundle verify": verify,
+    "loadtest": loadtest,
 }
 
 

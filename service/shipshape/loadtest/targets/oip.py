@@ -1,0 +1,62 @@
+"""The Open Inference Protocol v2 over HTTP, in JSON: any server that takes ragged clusters as two tensors.
+
+Inputs: `points` FP32 [n, 3], the points of all contacts one after the other; `counts` INT32 [contacts], how many
+each has. An output `rung`, where there is one, tells full answers from degraded ones.
+"""
+
+from typing import Any
+
+import numpy as np
+import orjson
+
+from shipshape.errors import SettingsError
+from shipshape.loadtest.mixture import Request
+from shipshape.loadtest.outcomes import Reply, answered_on
+from shipshape.loadtest.targets.address import Address
+from shipshape.loadtest.targets.http import JSON, HttpClient
+from shipshape.loadtest.targets.target import TargetError, TargetInfo
+
+
+class OipTarget:
+    """v2/models/MODEL/infer."""
+
+    def __init__(self, address: Address) -> None:
+        if not address.path:
+            raise SettingsError(f"expected a model, as in {address.scheme}://{address.host}/shipshape, got none")
+        self._address = address
+        self._model = f"/v2/models/{address.path}"
+
+    async def open(self) -> TargetInfo:
+        """As `Target.open`."""
+        self._client = HttpClient(self._address)
+        try:
+            model = await self._client.describe(self._model)
+        except TargetError:
+            await self.close()
+            raise
+        versions = model.get("versions") or [""]
+        return TargetInfo(version=str(model.get("platform", "")), bundle_name=str(versions[-1]))
+
+    def encode(self, request: Request) -> bytes:
+        """As `Target.encode`."""
+        points = np.ascontiguousarray(np.concatenate(request.clusters))
+        counts = [len(cluster) for cluster in request.clusters]
+        inputs = [
+            {"name": "points", "shape": points.shape, "datatype": "FP32", "data": points.ravel()},
+            {"name": "counts", "shape": [len(counts)], "datatype": "INT32", "data": counts},
+        ]
+        return orjson.dumps({"inputs": inputs}, option=orjson.OPT_SERIALIZE_NUMPY)
+
+    async def send(self, payload: bytes, deadline_s: float) -> Reply:
+        """As `Target.send`."""
+        return await self._client.post(f"{self._model}/infer", payload, JSON, deadline_s, _of_answer)
+
+    async def close(self) -> None:
+        """As `Target.close`."""
+        await self._client.close()
+
+
+def _of_answer(answer: dict[str, Any]) -> Reply:
+    return answered_on(
+        [rung for output in answer["outputs"] if output["name"] == "rung" for rung in output["data"]]
+    )

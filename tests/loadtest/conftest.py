@@ -1,0 +1,3 @@
+from serving.fakes import doors
+
+__all__ = ["doors"]
