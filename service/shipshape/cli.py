@@ -186,6 +186,7 @@ def _add_load_options(parser: argparse.ArgumentParser) -> None:
     load.add_argument(
         "--points", metavar="LIST", help="of a contact, with weights: 50=2,300=8,2000 (default: 300)"
     )
+    load.add_argument("--lanes", metavar="LIST", help="with weights: collision,tracking=8 (default: tracking)")
     load.add_argument("--clusters", type=Path, metavar="FILE", help="to cut contacts from (default: built in)")
     load.add_argument("--deadline", metavar="TIME", help="of each request (default: the budget's limit)")
     load.add_argument(

@@ -15,6 +15,7 @@ from shipshape.loadtest.options import options_of
 from shipshape.loadtest.processes import Processes
 from shipshape.loadtest.targets.target import TargetError
 
+TWO_PROCESSES = ["--contacts", "4", "--processes", "2", "--arrivals", "constant"]
 TARGET = "grpc://127.0.0.1:50051"
 GENEROUS = ["--budget", "p50=60s", "--rate", "40", "--duration", "1s", "--warmup", "500ms"]
 
@@ -104,6 +105,7 @@ def test_the_plan_is_what_the_arguments_ask_for():
         (["--contacts", "0"], "for --contacts"),
         (["--processes", "-1"], "for --processes"),
         (["--points", "50,x"], "for --points"),
+        (["--lanes", "collision,fast"], "--lanes of collision, tracking, batch, got 'fast'"),
         (["--arrivals", "poison"], "--arrivals poisson, constant, bursts:N or a .csv"),
         (["--arrivals", "bursts:x"], "--arrivals bursts:N"),
         (["--arrivals", "none.csv"], "to read none.csv"),
@@ -122,6 +124,11 @@ def test_a_wrong_command_is_2_and_one_sentence(on_paper, capsys, arguments, word
     assert error.startswith("shipshape: expected ")
     assert words in error
     assert error.count("\n") == 1
+
+
+def test_a_protocol_without_lanes_is_sent_none(capsys):
+    assert main(["loadtest", "oip+http://127.0.0.1:1/m", "--lanes", "batch"]) == 2
+    assert "--lanes with gRPC or REST" in capsys.readouterr().err
 
 
 def test_no_target_is_2(capsys):
@@ -189,7 +196,7 @@ def test_over_grpc_with_everything_written(doors, tmp_path, capsys):
 def test_scans_over_rest_from_two_processes(doors):
     doors.pipeline.computed.clear()
     url = f"http://127.0.0.1:{doors.addresses.rest_port}"
-    assert main(["loadtest", url, *GENEROUS, "--contacts", "4", "--processes", "2", "--arrivals", "constant"]) == 0
+    assert main(["loadtest", url, *GENEROUS, *TWO_PROCESSES, "--lanes", "batch"]) == 0
     assert len(doors.pipeline.computed) == 60  # 1.5 s of 40 a second
 
 

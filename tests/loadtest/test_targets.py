@@ -16,7 +16,10 @@ from shipshape.loadtest.outcomes import Outcome
 from shipshape.loadtest.precise import precise_loop
 from shipshape.loadtest.targets import target_at
 from shipshape.loadtest.targets.address import Keys, parse_address, read_token
+from shipshape.loadtest.targets.grpc import GrpcTarget
+from shipshape.loadtest.targets.rest import RestTarget
 from shipshape.loadtest.targets.target import TargetError
+from shipshape.v1 import shipshape_pb2 as pb
 
 PATIENCE_S = 10.0
 ONE, THREE = Request((cluster(),)), Request((cluster(40), cluster(60), cluster(10)))
@@ -68,6 +71,18 @@ def test_single_contacts_and_scans_are_answered(doors, door):
     replies = run(asked(both(doors)[door], ONE, THREE, ONE))
     assert [reply.outcome for reply in replies] == [Outcome.OK] * 3
     assert len(doors.pipeline.computed) == 5
+
+
+@pytest.mark.parametrize("clusters", [ONE.clusters, THREE.clusters], ids=["one", "scan"])
+def test_lanes_go_along(doors, clusters):
+    request = Request(clusters, "batch")
+    for url in both(doors).values():
+        assert [reply.outcome for reply in run(asked(url, request))] == [Outcome.OK]
+    message = GrpcTarget(address("grpc://127.0.0.1:1")).encode(request).message
+    kind = pb.RecogniseRequest if len(clusters) == 1 else pb.RecogniseScanRequest
+    assert kind.FromString(message).options.lane == pb.LANE_BATCH
+    path, body, _ = RestTarget(address("http://127.0.0.1:1")).encode(request)
+    assert path == "/v1/recognise?lane=batch" if len(clusters) == 1 else json.loads(body)["lane"] == "batch"
 
 
 @pytest.mark.parametrize("door", ["grpc", "rest"])

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from shipshape.errors import SettingsError
+from shipshape.executor import Lane
 from shipshape.loadtest.arrivals import Arrivals, Times, bursts, constant, equal, poisson
 from shipshape.loadtest.budget import Budget, parse_budget
 from shipshape.loadtest.mixture import Mixture, cut
@@ -129,7 +130,11 @@ def _mixture(arguments: argparse.Namespace) -> Mixture:
     sizes: Mapping[int, float] = {
         _positive(size, "--points"): weight for size, weight in (weights_of(points) if points else {}).items()
     }
-    lanes = {"": 1.0}
+    lanes = weights_of(arguments.lanes) if arguments.lanes else {"": 1.0}
+    if unknown := sorted(set(lanes) - {"", *Lane}):
+        raise SettingsError(f"expected --lanes of {', '.join(Lane)}, got {unknown[0]!r:.80}")
+    if arguments.lanes and arguments.target.startswith("oip"):
+        raise SettingsError("expected --lanes with gRPC or REST, got a target of a protocol that has none")
     return Mixture(cut(clusters, sizes, np.random.default_rng(arguments.seed)), lanes)
 
 

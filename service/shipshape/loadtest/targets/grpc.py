@@ -69,7 +69,7 @@ class GrpcTarget:
 
     def encode(self, request: Request) -> GrpcPayload:
         """As `Target.encode`."""
-        options = pb.Options()
+        options = pb.Options(lane=f"LANE_{request.lane.upper()}") if request.lane else None
         contacts = [pb.Contact(points=cluster.astype("<f4").tobytes()) for cluster in request.clusters]
         if len(contacts) == 1:
             single = pb.RecogniseRequest(contact=contacts[0], options=options)

@@ -51,9 +51,11 @@ class RestTarget:
         """As `Target.encode`."""
         packed = [cluster.astype("<f4").tobytes() for cluster in request.clusters]
         if len(packed) == 1:
-            return RestPayload("/v1/recognise", packed[0], PACKED)
+            query = f"?lane={request.lane}" if request.lane else ""
+            return RestPayload(f"/v1/recognise{query}", packed[0], PACKED)
         contacts = [{"points_base64": base64.b64encode(points).decode("ascii")} for points in packed]
-        return RestPayload("/v1/scan", orjson.dumps({"contacts": contacts}), JSON)
+        options = {"lane": request.lane} if request.lane else {}
+        return RestPayload("/v1/scan", orjson.dumps({"contacts": contacts, **options}), JSON)
 
     async def send(self, payload: RestPayload, deadline_s: float) -> Reply:
         """As `Target.send`."""
