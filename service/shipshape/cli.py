@@ -1,4 +1,4 @@
-"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR.
+"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR | token NAME.
 
 Exit codes: 0 all went well; 1 a cluster or file was refused, or the service failed; 2 the command, a setting
 or the bundle is wrong.
@@ -70,6 +70,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_classify(commands)
     _add_check(commands)
     _add_bundle(commands)
+    _add_token(commands)
     return parser
 
 
@@ -131,6 +132,13 @@ def _add_bundle(commands: _Commands) -> None:
     verify = _add(actions, "verify", summary, "example:\n  shipshape bundle verify models")
     verify.set_defaults(command="bundle verify")
     verify.add_argument("folder", type=Path, metavar="DIR")
+
+
+def _add_token(commands: _Commands) -> None:
+    notes = "example:\n  shipshape token fleet    # what to do with the two lines: docs/security.md"
+    parser = _add(commands, "token", "make a bearer token, and its line for SHIPSHAPE_TOKENS_FILE", notes)
+    parser.set_defaults(command="token")
+    parser.add_argument("name", metavar="NAME", help="of the client that will hold it")
 
 
 def _add_bundle_option(parser: argparse.ArgumentParser) -> None:
