@@ -4,10 +4,11 @@ ShipshapeError
 |-- InvalidInput          bytes -> contact: the caller sent something else than was asked for
 |   |-- TooLarge          more bytes, points or contacts than the limits allow
 |   `-- Unprocessable     well-formed, but not a vessel's cluster (NaN, too few points, too wide)
-|-- Overloaded            contact -> executor: the queue is full
+|-- Overloaded            contact -> executor: the queue is full, or the caller asks more than its share
 |-- DeadlineExceeded      executor -> stages: the answer would come too late
 |-- Cancelled             executor -> stages: the caller left
 |-- NotReady              the service is starting or stopping
+|-- Unauthenticated       caller -> service: a token that is asked for is missing or unknown
 |-- BundleError           files -> models: the bundle is missing, damaged or of another shape
 |-- FileError             file -> clusters: the file cannot be read
 `-- SettingsError         environment or command line -> settings: unknown, or a value that cannot work
@@ -33,7 +34,16 @@ class Unprocessable(InvalidInput):
 
 
 class Overloaded(ShipshapeError):
-    """The bounded queue is full; the caller may come back later."""
+    """The bounded queue is full, or the caller is over its share; it may come back later.
+
+    Args:
+        message: See above.
+        retry_after_s: Seconds after which it is worth another try; None when nobody can tell.
+    """
+
+    def __init__(self, message: str, *, retry_after_s: float | None = None) -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
 
 
 class DeadlineExceeded(ShipshapeError):
@@ -46,6 +56,10 @@ class Cancelled(ShipshapeError):
 
 class NotReady(ShipshapeError):
     """The service is still warming up, or stopping."""
+
+
+class Unauthenticated(ShipshapeError):
+    """The caller has not shown who it is."""
 
 
 class BundleError(ShipshapeError):
