@@ -34,12 +34,7 @@ class Unprocessable(InvalidInput):
 
 
 class Overloaded(ShipshapeError):
-    """The bounded queue is full, or the caller is over its share; it may come back later.
-
-    Args:
-        message: See above.
-        retry_after_s: Seconds after which it is worth another try; None when nobody can tell.
-    """
+    """No place or no time among all others; the caller may come back after `retry_after_s` seconds, if known."""
 
     def __init__(self, message: str, *, retry_after_s: float | None = None) -> None:
         super().__init__(message)

@@ -58,6 +58,12 @@ class Metrics:
         self._contacts = Counter(
             "shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"], registry=registry
         )
+        self._client_refusals = Counter(
+            "shipshape_client_refusals",
+            "Requests refused for who asks: token, rate or under_way.",
+            ["reason"],
+            registry=registry,
+        )
         self._in_flight = Gauge("shipshape_in_flight", "Requests under way.", ["door"], registry=registry)
         self._queue = Gauge("shipshape_queue_depth", "Contacts that wait for a worker.", registry=registry)
         self._running = Gauge("shipshape_running", "Contacts being computed.", registry=registry)
@@ -73,6 +79,10 @@ class Metrics:
         """Contacts of a scan were answered ("ok") or refused (the kind of the error)."""
         for outcome, count in collections.Counter(outcomes).items():
             self._contacts.labels(door, outcome).inc(count)
+
+    def count_client_refusal(self, reason: str) -> None:
+        """A request was refused for who asks; who that is would be a label without bounds."""
+        self._client_refusals.labels(reason).inc()
 
     def watch_queue(self, depth: Callable[[], float], running: Callable[[], float]) -> None:
         """Read both gauges from the executor whenever somebody scrapes."""

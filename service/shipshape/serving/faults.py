@@ -15,6 +15,7 @@ from shipshape.errors import (
     NotReady,
     Overloaded,
     TooLarge,
+    Unauthenticated,
     Unprocessable,
 )
 
@@ -31,6 +32,7 @@ class FaultKind(StrEnum):
     DEADLINE_EXCEEDED = "deadline_exceeded"
     CANCELLED = "cancelled"
     NOT_READY = "not_ready"
+    UNAUTHENTICATED = "unauthenticated"
     INTERNAL = "internal"
 
 
@@ -40,6 +42,7 @@ class Fault:
 
     kind: FaultKind
     message: str
+    retry_after_s: float | None = None  # seconds; None when nobody can tell
 
 
 # The first class that fits; an error that is not listed tells the caller nothing but an id.
@@ -51,6 +54,7 @@ _KINDS: tuple[tuple[type[Exception], FaultKind], ...] = (
     (DeadlineExceeded, FaultKind.DEADLINE_EXCEEDED),
     (Cancelled, FaultKind.CANCELLED),
     (NotReady, FaultKind.NOT_READY),
+    (Unauthenticated, FaultKind.UNAUTHENTICATED),
 )
 
 
@@ -58,7 +62,7 @@ def fault_of(error: BaseException) -> Fault:
     """What the caller is told of `error`; one that was not meant is logged with its traceback and an id."""
     for known, kind in _KINDS:
         if isinstance(error, known):
-            return Fault(kind, str(error))
+            return Fault(kind, str(error), getattr(error, "retry_after_s", None))
     incident = uuid.uuid4().hex[:12]
     _logger.error("internal error %s", incident, exc_info=error)
     return Fault(FaultKind.INTERNAL, f"expected an answer, got an internal error; its id in the log is {incident}")

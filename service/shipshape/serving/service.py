@@ -14,6 +14,7 @@ from prometheus_client import CollectorRegistry
 
 from shipshape.errors import Cancelled
 from shipshape.executor import Executor, usable_cores
+from shipshape.serving.access import load_access
 from shipshape.serving.core import Core, Model, Render
 from shipshape.serving.encoding import Limits
 from shipshape.serving.grpc.server import GrpcDoor
@@ -50,6 +51,9 @@ class Service:
         settings: See there.
         render: Draws the picture of an answer.
         on_death: Called when a door ends without having been asked to.
+
+    Raises:
+        SettingsError: A file of certificates or tokens cannot be used.
     """
 
     def __init__(self, settings: Settings, render: Render, *, on_death: Callable[[], None]) -> None:
@@ -65,8 +69,10 @@ class Service:
         self.executor = Executor(workers, settings.queue_limit, on_stage=self._metrics.observe_stage)
         self._metrics.watch_queue(lambda: self.executor.queue_depth, lambda: self.executor.running)
         self._core = Core(self.executor, limits, render)
-        self._grpc = GrpcDoor(self._core, self._metrics, timeouts, waiting=settings.queue_limit + workers)
-        self._rest = RestDoor(build_app(self._core, self._metrics, timeouts), on_death=on_death)
+        access = load_access(settings, self._metrics.count_client_refusal)
+        self._grpc = GrpcDoor(self._core, self._metrics, timeouts, access, waiting=settings.queue_limit + workers)
+        app = build_app(self._core, self._metrics, timeouts, access)
+        self._rest = RestDoor(app, access.tls, on_death=on_death)
 
     def start(self) -> Addresses:
         """Listen and refuse; raises OSError, with nothing left open, when an address cannot be bound."""

@@ -1,5 +1,6 @@
 """What every RPC of shipshape.v1 passes: limits, parsing, metrics, request id, and the one table of errors."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -7,8 +8,10 @@ import grpc
 from google.protobuf.message import DecodeError
 
 from shipshape.errors import InvalidInput
+from shipshape.serving.access import Access
 from shipshape.serving.encoding import Limits, check_body
-from shipshape.serving.faults import FaultKind, fault_of
+from shipshape.serving.faults import Fault, FaultKind, fault_of
+from shipshape.serving.grpc.callers import client_of
 from shipshape.telemetry import SCAN, SINGLE, Metrics, new_request_id, request_id
 
 STATUS = {
@@ -19,6 +22,7 @@ STATUS = {
     FaultKind.DEADLINE_EXCEEDED: grpc.StatusCode.DEADLINE_EXCEEDED,
     FaultKind.CANCELLED: grpc.StatusCode.CANCELLED,
     FaultKind.NOT_READY: grpc.StatusCode.UNAVAILABLE,
+    FaultKind.UNAUTHENTICATED: grpc.StatusCode.UNAUTHENTICATED,
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
 METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info"}
@@ -29,8 +33,9 @@ Behaviour = Callable[[Any, grpc.ServicerContext], Any]
 class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
     """Wraps the methods of shipshape.v1 and leaves health and reflection alone."""
 
-    def __init__(self, metrics: Metrics, limits: Limits) -> None:
+    def __init__(self, metrics: Metrics, limits: Limits, access: Access) -> None:
         self._metrics = metrics
+        self._access = access
         self._limits = limits
 
     def intercept_service(self, continuation: Any, handler_call_details: Any) -> Any:
@@ -47,26 +52,44 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 
     def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
         def call(raw: bytes, context: grpc.ServicerContext) -> Any:
-            new_request_id(_proposed_id(context))
+            identify(context)
             with self._metrics.request("grpc", method) as outcome:
                 try:
                     check_body(len(raw), self._limits)
                     message = _parsed(raw, parse)
                     if method == SCAN:
                         outcome.contacts = len(message.contacts)
-                    return behaviour(message, context)
+                    with self._access.clients.share(client_of(context, self._access)) as share:
+                        share.take(min(outcome.contacts, self._limits.max_contacts))
+                        return behaviour(message, context)
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
-                    set_trailing(context, ("shipshape-error", fault.kind))
-                    _abort(context, STATUS[fault.kind], fault.message)
+                    refuse(context, fault)
 
         return call
+
+
+def identify(context: grpc.ServicerContext) -> None:
+    """Give the call its id, in its trailing metadata and in the log: the caller's own, else a fresh one."""
+    metadata = dict(context.invocation_metadata() or ())
+    proposed = metadata.get("x-request-id", "")
+    new_request_id(proposed if isinstance(proposed, str) else "")
 
 
 def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str]) -> None:
     """Trailing metadata: `entries` and the request's id."""
     context.set_trailing_metadata((*entries, ("x-request-id", request_id.get())))
+
+
+def refuse(context: grpc.ServicerContext, fault: Fault) -> NoReturn:
+    """End the call with the status of `fault`, and tell gRPC's own retries how long to wait."""
+    entries = [("shipshape-error", str(fault.kind))]
+    if fault.retry_after_s is not None:
+        entries.append(("grpc-retry-pushback-ms", str(math.ceil(fault.retry_after_s * 1e3))))
+    set_trailing(context, *entries)
+    context.abort(STATUS[fault.kind], fault.message)
+    raise AssertionError("unreachable: abort raises")
 
 
 def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:
@@ -76,14 +99,3 @@ def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:
         raise InvalidInput(
             f"expected a message of shipshape.v1, got {len(raw)} bytes that do not parse as one"
         ) from error
-
-
-def _abort(context: grpc.ServicerContext, code: grpc.StatusCode, message: str) -> NoReturn:
-    context.abort(code, message)
-    raise AssertionError("unreachable: abort raises")
-
-
-def _proposed_id(context: grpc.ServicerContext) -> str:
-    metadata = dict(context.invocation_metadata() or ())
-    proposed = metadata.get("x-request-id", "")
-    return proposed if isinstance(proposed, str) else ""

@@ -1,5 +1,6 @@
 """The one table of errors of the REST door, and RFC 9457 problem documents."""
 
+import math
 from http import HTTPStatus
 
 import orjson
@@ -18,6 +19,7 @@ STATUS = {
     FaultKind.DEADLINE_EXCEEDED: 504,
     FaultKind.CANCELLED: 499,  # not registered, but what proxies log for a client that left
     FaultKind.NOT_READY: 503,
+    FaultKind.UNAUTHENTICATED: 401,
     FaultKind.INTERNAL: 500,
 }
 MEDIA_TYPE = "application/problem+json"
@@ -34,7 +36,12 @@ def identify(request: Request) -> str:
 def problem(fault: Fault) -> Response:
     """The problem document of a fault."""
     title = fault.kind.replace("_", " ").capitalize()
-    return _document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
+    response = _document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
+    if fault.retry_after_s is not None:
+        response.headers["Retry-After"] = str(math.ceil(fault.retry_after_s))
+    if fault.kind is FaultKind.UNAUTHENTICATED:
+        response.headers["WWW-Authenticate"] = "Bearer"
+    return response
 
 
 def add_handlers(app: FastAPI) -> None:
