@@ -1,4 +1,5 @@
 import datetime
+import errno
 import socket
 import ssl
 import warnings
@@ -125,6 +126,23 @@ def test_new_files_hold_for_new_connections(files, monkeypatch, door):
         assert ask(doors.addresses, STRANGER, BOAT) == REFUSED
 
 
+def test_no_client_takes_up_a_session_that_its_certificate_began(mutual):
+    context = tls_context(AUTHORITY, BOAT)
+
+    def session(before):
+        """The session of a connection that got an answer, after which a ticket would have come."""
+        with (
+            socket.create_connection((HOST, mutual.rest_port), PATIENCE) as connection,
+            context.wrap_socket(connection, server_hostname=HOST, session=before) as secured,
+        ):
+            secured.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert secured.recv(100).startswith(b"HTTP/1.1 200 ")
+            assert not secured.session_reused
+            return secured.session
+
+    session(session(None))
+
+
 def test_a_connection_outlives_the_files_it_began_with(files, monkeypatch):
     monkeypatch.setattr(reloading, "LOOK_S", 0.0)
     with (
@@ -192,6 +210,15 @@ def test_a_file_that_is_none_stops_the_start(files, name, content):
     else:
         path.write_bytes(content)
         assert f"in {path.name}" in refusal(files, mutual=True)
+
+
+def test_a_file_that_is_moved_away_while_it_is_read_is_told_too(files, monkeypatch):
+    def gone(*_, **__):
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory")
+
+    for name in ("load_verify_locations", "load_cert_chain"):
+        monkeypatch.setattr(ssl.SSLContext, name, gone)
+        assert refusal(files, mutual=True).endswith("got: No such file or directory")
 
 
 def test_a_client_ca_that_can_vouch_for_nobody_stops_the_start(files):

@@ -72,7 +72,7 @@ def _load(files: TlsFiles) -> TlsMaterial:
             files.certificate, files.key, password=""
         )  # else OpenSSL asks the terminal for one
         _try_handshake(context, files.certificate)
-    except ssl.SSLError as error:
+    except OSError as error:  # of TLS, or of a file that has just been moved away
         raise SettingsError(
             f"expected a server's valid certificate in {files.certificate} and its key in {files.key}, "
             f"got: {_complaint(error)}"
@@ -98,7 +98,7 @@ def _try_handshake(server: ssl.SSLContext, certificate: Path) -> None:
 def _demand_certificates(context: ssl.SSLContext, client_ca: Path) -> None:
     try:
         context.load_verify_locations(client_ca)
-    except ssl.SSLError as error:
+    except OSError as error:
         raise SettingsError(
             f"expected certificates of authorities in {client_ca}, got: {_complaint(error)}"
         ) from error
@@ -107,12 +107,15 @@ def _demand_certificates(context: ssl.SSLContext, client_ca: Path) -> None:
         found = "only expired ones" if ends else "none"
         raise SettingsError(f"expected certificates of authorities in {client_ca}, got {found}")
     context.verify_mode = ssl.VerifyMode.CERT_REQUIRED
+    context.num_tickets = 0  # who takes a session up again shows no certificate; TLS 1.2 still can, for two hours
 
 
-def _complaint(error: ssl.SSLError) -> str:
+def _complaint(error: OSError) -> str:
     if isinstance(error, ssl.SSLCertVerificationError):
         return str(error.verify_message)
-    return str(error.reason or error).replace("_", " ").lower()
+    if isinstance(error, ssl.SSLError):
+        return str(error.reason or error).replace("_", " ").lower()
+    return str(error.strerror)
 
 
 def _read(path: Path) -> bytes:
