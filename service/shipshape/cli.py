@@ -1,4 +1,4 @@
-"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR | loadtest TARGET.
+"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR | loadtest TARGET | token NAME.
 
 Exit codes: 0 all went well; 1 a cluster or file was refused, or the service failed; 2 the command, a setting
 or the bundle is wrong. Of loadtest: 0 the budget was held; 1 it was not; 2 as above, or no target; 3 the tool was
@@ -87,6 +87,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_check(commands)
     _add_bundle(commands)
     _add_loadtest(commands)
+    _add_token(commands)
     return parser
 
 
@@ -201,6 +202,13 @@ def _add_load_options(parser: argparse.ArgumentParser) -> None:
         help="beyond, nothing is sent (default: %(default)s)",
     )
     load.add_argument("--seed", type=int, default=0, help="of all that is drawn (default: %(default)s)")
+
+
+def _add_token(commands: _Commands) -> None:
+    notes = "example:\n  shipshape token fleet    # what to do with the two lines: docs/security.md"
+    parser = _add(commands, "token", "make a bearer token, and its line for SHIPSHAPE_TOKENS_FILE", notes)
+    parser.set_defaults(command="token")
+    parser.add_argument("name", metavar="NAME", help="of the client that will hold it")
 
 
 def _add_bundle_option(parser: argparse.ArgumentParser) -> None:

@@ -26,6 +26,7 @@ from shipshape.pipeline import Pipeline
 from shipshape.render import render_png
 from shipshape.sample import sample_contact
 from shipshape.serving.life import serve as serve_until_signal
+from shipshape.serving.tokens import check_name, fresh_token, hash_of
 from shipshape.settings import SettingsError, load_settings
 from shipshape.tables import answer_line, columns, refusal_line, title_line
 from shipshape.types import ImageMethod, Options, Preset
@@ -100,12 +101,21 @@ def loadtest(arguments: argparse.Namespace) -> int:
     return run(arguments)
 
 
+def token(arguments: argparse.Namespace) -> int:
+    """Print a fresh token, which is kept nowhere, and the line that lets its holder in."""
+    name, fresh = check_name(arguments.name), fresh_token()
+    print(f"token: {fresh}")
+    print(f"line:  {name} {hash_of(fresh)}")
+    return OK
+
+
 COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "serve": serve,
     "classify": classify,
     "check": check,
     "bundle verify": verify,
     "loadtest": loadtest,
+    "token": token,
 }
 
 

@@ -4,10 +4,11 @@ ShipshapeError
 |-- InvalidInput          bytes -> contact: the caller sent something else than was asked for
 |   |-- TooLarge          more bytes, points or contacts than the limits allow
 |   `-- Unprocessable     well-formed, but not a vessel's cluster (NaN, too few points, too wide)
-|-- Overloaded            contact -> executor: the queue is full, or too long for the time left
+|-- Overloaded            contact -> executor: no place or no time left, or over the caller's share
 |-- DeadlineExceeded      executor -> stages: the answer would come too late
 |-- Cancelled             executor -> stages: the caller left
 |-- NotReady              the service is starting or stopping
+|-- Unauthenticated       caller -> service: a token that is asked for is missing or unknown
 |-- BundleError           files -> models: the bundle is missing, damaged or of another shape
 |-- FileError             file -> clusters: the file cannot be read
 `-- SettingsError         environment or command line -> settings: unknown, or a value that cannot work
@@ -50,6 +51,10 @@ class Cancelled(ShipshapeError):
 
 class NotReady(ShipshapeError):
     """The service is still warming up, or stopping."""
+
+
+class Unauthenticated(ShipshapeError):
+    """The caller has not shown who it is."""
 
 
 class BundleError(ShipshapeError):

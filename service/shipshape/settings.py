@@ -80,6 +80,41 @@ class Settings(BaseSettings):
         "others.",
     )
     max_contacts: int = Field(256, ge=1, description="Contacts of one scan. They are queued all at once.")
+    tls_certificate: Path | None = Field(
+        None,
+        description="PEM file of the certificate of both doors, followed by its intermediate ones; with tls_key. "
+        "None speaks plain HTTP and gRPC. Read again within a second of a change, as are all files below.",
+    )
+    tls_key: Path | None = Field(None, description="PEM file of the certificate's private key, not encrypted.")
+    tls_client_ca: Path | None = Field(
+        None,
+        description="PEM file of the authorities whose client certificates are accepted; a client without one is "
+        "then refused (mTLS). None asks for no certificate.",
+    )
+    tokens_file: Path | None = Field(
+        None,
+        description="File of NAME SHA256HEX lines, as `shipshape token NAME` prints them; a caller without one of "
+        "these tokens is refused. None asks for no token.",
+    )
+    client_contacts_per_s: float = Field(
+        0.0,
+        ge=0,
+        allow_inf_nan=False,
+        description="Contacts a second that one client may ask for; 0 sets no limit. A client is a token, else a "
+        "client certificate, else an address.",
+    )
+    client_burst: int = Field(
+        512,
+        ge=1,
+        description="Contacts that one client may ask for at once after a rest, at least max_contacts; holds with "
+        "client_contacts_per_s alone.",
+    )
+    client_under_way: int = Field(
+        0,
+        ge=0,
+        description="Contacts of one client that may wait or be computed, at least max_contacts; 0 sets no limit. "
+        "Below queue_limit, it keeps one client from filling the queue.",
+    )
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         "info", description="Least severe log line written; debug adds one line a request."
     )
@@ -91,6 +126,26 @@ class Settings(BaseSettings):
                 f"expected {PREFIX}QUEUE_LIMIT to hold a whole scan, {PREFIX}MAX_CONTACTS = {self.max_contacts}, "
                 f"got {self.queue_limit}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _a_scan_fits_the_limits_of_a_client(self) -> "Settings":
+        limits = {"CLIENT_BURST": self.client_burst if self.client_contacts_per_s else 0}
+        limits["CLIENT_UNDER_WAY"] = self.client_under_way
+        for name, limit in limits.items():
+            if 0 < limit < self.max_contacts:
+                raise ValueError(
+                    f"expected {PREFIX}{name} to hold a whole scan, {PREFIX}MAX_CONTACTS = {self.max_contacts}, "
+                    f"got {limit}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _tls_is_whole(self) -> "Settings":
+        if (self.tls_certificate is None) != (self.tls_key is None):
+            raise ValueError(f"expected both {PREFIX}TLS_CERTIFICATE and {PREFIX}TLS_KEY, got one of them")
+        if self.tls_client_ca is not None and self.tls_certificate is None:
+            raise ValueError(f"expected {PREFIX}TLS_CLIENT_CA beside {PREFIX}TLS_CERTIFICATE, got it alone")
         return self
 
 

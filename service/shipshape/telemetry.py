@@ -59,39 +59,33 @@ class Metrics:
     def __init__(self, registry: CollectorRegistry, budget: Budget) -> None:
         self.registry = registry
         self.budget = budget
-        self._stage = Histogram(
-            "shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS, registry=registry
-        )
-        self._request = Histogram(
+        histogram, counter = partial(Histogram, registry=registry), partial(Counter, registry=registry)
+        gauge = partial(Gauge, registry=registry)
+        self._stage = histogram("shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS)
+        self._request = histogram(
             "shipshape_request_seconds",
             "Time of one request at the door, whatever the outcome.",
             ["door", "method", "outcome"],
             buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
-            registry=registry,
         )
-        self._wait = Histogram(
-            "shipshape_queue_seconds",
-            "Time that a contact waited for a worker.",
-            ["lane"],
-            buckets=STAGE_BUCKETS,
-            registry=registry,
+        self._wait = histogram(
+            "shipshape_queue_seconds", "Time that a contact waited for a worker.", ["lane"], buckets=STAGE_BUCKETS
         )
-        self._age = Histogram(
+        self._age = histogram(
             "shipshape_age_seconds",
             "Age of the points when their request came, where the caller tells it.",
             buckets=AGE_BUCKETS,
-            registry=registry,
         )
-        self._contacts = Counter(
-            "shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"], registry=registry
+        self._contacts = counter("shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"])
+        self._client_refusals = counter(
+            "shipshape_client_refusals", "Requests refused for who asks: token, rate or under_way.", ["reason"]
         )
-        self._in_flight = Gauge("shipshape_in_flight", "Requests under way.", ["door"], registry=registry)
-        self._ready = Gauge("shipshape_ready", "1 while the service takes requests.", registry=registry)
-        self._held = Counter(
+        self._in_flight = gauge("shipshape_in_flight", "Requests under way.", ["door"])
+        self._ready = gauge("shipshape_ready", "1 while the service takes requests.")
+        self._held = counter(
             "shipshape_budget",
             "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
             ["inside"],
-            registry=registry,
         )
         watch_budget(budget, registry)
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
@@ -113,6 +107,10 @@ class Metrics:
     def observe_age(self, seconds: float) -> None:
         """The points of a request were this old; seconds."""
         self._age.observe(seconds)
+
+    def count_client_refusal(self, reason: str) -> None:
+        """A request was refused for who asks; who that is would be a label without bounds."""
+        self._client_refusals.labels(reason).inc()
 
     def set_ready(self, ready: bool) -> None:
         """Whether the service takes requests."""

@@ -53,6 +53,38 @@ def test_a_scan_must_fit_the_queue():
     )
 
 
+def test_a_scan_must_fit_the_limits_of_a_client():
+    assert load_settings(client_burst=1).client_burst == 1, "which holds with a rate alone"
+    for limits in ({"client_burst": 255, "client_contacts_per_s": 10.0}, {"client_under_way": 255}):
+        with pytest.raises(SettingsError) as caught:
+            load_settings(**limits)
+        assert str(caught.value) == (
+            f"expected SHIPSHAPE_{next(iter(limits)).upper()} to hold a whole scan, "
+            "SHIPSHAPE_MAX_CONTACTS = 256, got 255"
+        )
+
+
+@pytest.mark.parametrize("rate", ["-1", "inf", "nan"])
+def test_a_rate_must_be_a_number_of_contacts(monkeypatch, rate):
+    monkeypatch.setenv("SHIPSHAPE_CLIENT_CONTACTS_PER_S", rate)
+    with pytest.raises(SettingsError, match=f"SHIPSHAPE_CLIENT_CONTACTS_PER_S, got '{rate}'"):
+        load_settings()
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (("tls_key",), "expected both SHIPSHAPE_TLS_CERTIFICATE and SHIPSHAPE_TLS_KEY, got one of them"),
+        (("tls_certificate",), "expected both SHIPSHAPE_TLS_CERTIFICATE and SHIPSHAPE_TLS_KEY, got one of them"),
+        (("tls_client_ca",), "expected SHIPSHAPE_TLS_CLIENT_CA beside SHIPSHAPE_TLS_CERTIFICATE, got it alone"),
+    ],
+)
+def test_half_of_tls_refuses_the_start(given, sentence):
+    with pytest.raises(SettingsError) as caught:
+        load_settings(**dict.fromkeys(given, "file.pem"))
+    assert str(caught.value) == sentence
+
+
 def test_the_contact_of_the_warm_up_must_pass():
     assert load_settings(max_points=len(sample_contact().points_level)).max_points == 1000
     with pytest.raises(SettingsError, match="SHIPSHAPE_MAX_POINTS, got 999"):

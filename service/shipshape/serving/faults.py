@@ -15,6 +15,7 @@ from shipshape.errors import (
     NotReady,
     Overloaded,
     TooLarge,
+    Unauthenticated,
     Unprocessable,
 )
 
@@ -31,6 +32,7 @@ class FaultKind(StrEnum):
     DEADLINE_EXCEEDED = "deadline_exceeded"
     CANCELLED = "cancelled"
     NOT_READY = "not_ready"
+    UNAUTHENTICATED = "unauthenticated"
     INTERNAL = "internal"
 
 
@@ -52,6 +54,7 @@ _KINDS: tuple[tuple[type[Exception], FaultKind], ...] = (
     (DeadlineExceeded, FaultKind.DEADLINE_EXCEEDED),
     (Cancelled, FaultKind.CANCELLED),
     (NotReady, FaultKind.NOT_READY),
+    (Unauthenticated, FaultKind.UNAUTHENTICATED),
 )
 
 

@@ -16,6 +16,7 @@ from shipshape.budget import Budget
 from shipshape.errors import Cancelled
 from shipshape.executor import Executor, usable_cores
 from shipshape.sample import sample_contact
+from shipshape.serving.access import load_access
 from shipshape.serving.core import Core, Model, Render
 from shipshape.serving.encoding import Limits
 from shipshape.serving.grpc.server import GrpcDoor
@@ -52,6 +53,9 @@ class Service:
         settings: See there.
         render: Draws the picture of an answer.
         on_death: Called when a door ends without having been asked to.
+
+    Raises:
+        SettingsError: A file of certificates or tokens cannot be used.
     """
 
     def __init__(self, settings: Settings, render: Render, *, on_death: Callable[[], None]) -> None:
@@ -72,8 +76,10 @@ class Service:
         )
         watch_workers(self.executor, self._metrics.registry)
         self._core = Core(self.executor, limits, render, on_age=self._metrics.observe_age)
-        self._grpc = GrpcDoor(self._core, self._metrics, timeouts, waiting=settings.queue_limit + workers)
-        self._rest = RestDoor(build_app(self._core, self._metrics, timeouts), on_death=on_death)
+        access = load_access(settings, self._metrics.count_client_refusal)
+        self._grpc = GrpcDoor(self._core, self._metrics, timeouts, access, waiting=settings.queue_limit + workers)
+        app = build_app(self._core, self._metrics, timeouts, access)
+        self._rest = RestDoor(app, access.tls, on_death=on_death)
 
     def start(self) -> Addresses:
         """Listen and refuse; raises OSError, with nothing left open, when an address cannot be bound."""

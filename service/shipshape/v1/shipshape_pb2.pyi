@@ -55,6 +55,7 @@ class ErrorKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     ERROR_KIND_CANCELLED: _ClassVar[ErrorKind]
     ERROR_KIND_NOT_READY: _ClassVar[ErrorKind]
     ERROR_KIND_INTERNAL: _ClassVar[ErrorKind]
+    ERROR_KIND_UNAUTHENTICATED: _ClassVar[ErrorKind]
 PRESET_UNSPECIFIED: Preset
 PRESET_PAPER: Preset
 PRESET_BEST: Preset
@@ -86,6 +87,7 @@ ERROR_KIND_DEADLINE_EXCEEDED: ErrorKind
 ERROR_KIND_CANCELLED: ErrorKind
 ERROR_KIND_NOT_READY: ErrorKind
 ERROR_KIND_INTERNAL: ErrorKind
+ERROR_KIND_UNAUTHENTICATED: ErrorKind
 
 class Contact(_message.Message):
     __slots__ = ("contact_id", "points", "sensor_height_m", "own_true_heading_deg")

@@ -8,8 +8,10 @@ import grpc
 from google.protobuf.message import DecodeError
 
 from shipshape.errors import InvalidInput
+from shipshape.serving.access import Access
 from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import Fault, FaultKind, fault_of
+from shipshape.serving.grpc.callers import client_of
 from shipshape.telemetry import DEGRADED, SCAN, SINGLE, Metrics, new_request_id, request_id
 from shipshape.types import Rung
 from shipshape.v1 import shipshape_pb2 as pb
@@ -22,6 +24,7 @@ STATUS = {
     FaultKind.DEADLINE_EXCEEDED: grpc.StatusCode.DEADLINE_EXCEEDED,
     FaultKind.CANCELLED: grpc.StatusCode.CANCELLED,
     FaultKind.NOT_READY: grpc.StatusCode.UNAVAILABLE,
+    FaultKind.UNAUTHENTICATED: grpc.StatusCode.UNAUTHENTICATED,
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
 METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info", "GetCapacity": "capacity"}
@@ -32,8 +35,9 @@ Behaviour = Callable[[Any, grpc.ServicerContext], Any]
 class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
     """Wraps the methods of shipshape.v1 and leaves health and reflection alone."""
 
-    def __init__(self, metrics: Metrics, limits: Limits) -> None:
+    def __init__(self, metrics: Metrics, limits: Limits, access: Access) -> None:
         self._metrics = metrics
+        self._access = access
         self._limits = limits
 
     def intercept_service(self, continuation: Any, handler_call_details: Any) -> Any:
@@ -50,7 +54,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 
     def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
         def call(raw: bytes, context: grpc.ServicerContext) -> Any:
-            new_request_id(_proposed_id(context))
+            identify(context)
             with self._metrics.request("grpc", method) as outcome:
                 try:
                     check_body(len(raw), self._limits)
@@ -58,12 +62,13 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     if method == SCAN:
                         outcome.contacts = len(message.contacts)
                     outcome.urgent = method not in (SINGLE, SCAN) or message.options.lane != pb.LANE_BATCH
-                    response = behaviour(message, context)
+                    with self._access.clients.share(client_of(context, self._access)) as share:
+                        share.take(min(outcome.contacts, self._limits.max_contacts))
+                        response = behaviour(message, context)
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
-                    set_trailing(context, ("shipshape-error", fault.kind), *_pushback(fault))
-                    _abort(context, STATUS[fault.kind], fault.message)
+                    refuse(context, fault)
                 if method == SINGLE and response.recognition.rung != Rung.FULL:
                     outcome.kind = DEGRADED
                 return response
@@ -71,16 +76,26 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         return call
 
 
+def identify(context: grpc.ServicerContext) -> None:
+    """Give the call its id, in its trailing metadata and in the log: the caller's own, else a fresh one."""
+    metadata = dict(context.invocation_metadata() or ())
+    proposed = metadata.get("x-request-id", "")
+    new_request_id(proposed if isinstance(proposed, str) else "")
+
+
 def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str | bytes]) -> None:
     """Trailing metadata: `entries` and the request's id."""
     context.set_trailing_metadata((*entries, ("x-request-id", request_id.get())))
 
 
-def _pushback(fault: Fault) -> tuple[tuple[str, str], ...]:
-    """When clients with a retry policy shall come back; theirs is ignored then."""
-    if fault.retry_after_s is None:
-        return ()
-    return (("grpc-retry-pushback-ms", str(math.ceil(fault.retry_after_s * 1e3))),)
+def refuse(context: grpc.ServicerContext, fault: Fault) -> NoReturn:
+    """End the call with the status of `fault`, and tell gRPC's own retries how long to wait."""
+    entries = [("shipshape-error", str(fault.kind))]
+    if fault.retry_after_s is not None:
+        entries.append(("grpc-retry-pushback-ms", str(math.ceil(fault.retry_after_s * 1e3))))
+    set_trailing(context, *entries)
+    context.abort(STATUS[fault.kind], fault.message)
+    raise AssertionError("unreachable: abort raises")
 
 
 def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:
@@ -90,14 +105,3 @@ def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:
         raise InvalidInput(
             f"expected a message of shipshape.v1, got {len(raw)} bytes that do not parse as one"
         ) from error
-
-
-def _abort(context: grpc.ServicerContext, code: grpc.StatusCode, message: str) -> NoReturn:
-    context.abort(code, message)
-    raise AssertionError("unreachable: abort raises")
-
-
-def _proposed_id(context: grpc.ServicerContext) -> str:
-    metadata = dict(context.invocation_metadata() or ())
-    proposed = metadata.get("x-request-id", "")
-    return proposed if isinstance(proposed, str) else ""

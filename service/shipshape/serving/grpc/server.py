@@ -6,7 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 
+from shipshape.serving.access import Access
 from shipshape.serving.core import Core
+from shipshape.serving.grpc.doorkeeper import Doorkeeper, credentials
 from shipshape.serving.grpc.guard import Guard
 from shipshape.serving.grpc.reflection import PLACES, add_reflection
 from shipshape.serving.grpc.servicer import Servicer
@@ -26,17 +28,19 @@ class GrpcDoor:
         core: Answers.
         metrics: Told of every request.
         timeouts: Deadline of callers that set none.
+        access: Who may come in.
         waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
             executor's queue, which is bounded and refuses, is where they wait; reflection streams, which hold
             a thread each as well, are bounded for the same reason.
     """
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, *, waiting: int) -> None:
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, *, waiting: int) -> None:
         limits = core.limits
+        self._tls = access.tls
         self._health = health.HealthServicer()
         self._server = grpc.server(
             ThreadPoolExecutor(waiting + SPARE_THREADS, thread_name_prefix="grpc"),
-            interceptors=[Guard(metrics, limits)],
+            interceptors=[Doorkeeper(access), Guard(metrics, limits, access)],
             options=[
                 ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
                 ("grpc.max_receive_message_length", limits.max_body_bytes + MESSAGE_SLACK),
@@ -55,8 +59,12 @@ class GrpcDoor:
         Raises:
             OSError: The address cannot be bound.
         """
+        address = f"{_bracketed(host)}:{port}"
         try:
-            bound: int = self._server.add_insecure_port(f"{_bracketed(host)}:{port}")
+            if self._tls is None:
+                bound: int = self._server.add_insecure_port(address)
+            else:
+                bound = self._server.add_secure_port(address, credentials(self._tls))
         except RuntimeError as error:
             raise OSError(f"expected to listen on {host}:{port} for gRPC, but could not") from error
         self._server.start()

@@ -6,9 +6,11 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.responses import PlainTextResponse
 
+from shipshape.serving.access import Access
 from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.rest import contract
+from shipshape.serving.rest.doorkeeper import Doorkeeper
 from shipshape.serving.rest.problems import add_handlers
 from shipshape.serving.rest.routes import Routes
 from shipshape.serving.rest.schemas import CapacityAnswer, ModelAnswer, RecognitionAnswer, ScanAnswer
@@ -22,15 +24,16 @@ radians, except where a name ends in _deg. Packed points are little-endian float
 """
 
 
-def build_app(core: Core, metrics: Metrics, timeouts: Timeouts) -> FastAPI:
+def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access) -> FastAPI:
     """The application; it answers 503 until the core is open."""
     # The framework's documentation pages load scripts from elsewhere; the contract itself is at /openapi.json.
     app = FastAPI(
         title="Shipshape", version=version("shipshape"), description=DESCRIPTION, docs_url=None, redoc_url=None
     )
-    routes = Routes(core, metrics, timeouts)
+    routes = Routes(core, metrics, timeouts, access.clients)
     refusals = contract.problems(*(kind for kind in FaultKind if kind is not FaultKind.CANCELLED))
     not_ready = contract.problems(FaultKind.NOT_READY)
+    stranger = contract.problems(FaultKind.UNAUTHENTICATED)
 
     def add(path: str, handler: Any, *methods: str, **more: Any) -> None:
         app.add_api_route(path, handler, methods=list(methods), operation_id=handler.__name__, **more)
@@ -38,13 +41,15 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts) -> FastAPI:
     refusals |= contract.unsupported()
     add("/v1/recognise", routes.recognise, "POST", **_api(RecognitionAnswer, refusals, contract.recognise_extra()))
     add("/v1/scan", routes.scan, "POST", **_api(ScanAnswer, refusals, contract.scan_extra()))
-    add("/v1/model", routes.model, "GET", **_api(ModelAnswer, not_ready, None))
-    add("/v1/capacity", routes.capacity, "GET", **_api(CapacityAnswer, not_ready, contract.capacity_extra()))
+    add("/v1/model", routes.model, "GET", **_api(ModelAnswer, not_ready | stranger, None))
+    capacity_extra = contract.capacity_extra()
+    add("/v1/capacity", routes.capacity, "GET", **_api(CapacityAnswer, not_ready | stranger, capacity_extra))
     add("/livez", routes.live, "GET")
     add("/readyz", routes.ready, "GET", responses=not_ready)
-    add("/metrics", routes.metrics, "GET", response_class=PlainTextResponse)
+    add("/metrics", routes.metrics, "GET", response_class=PlainTextResponse, responses=stranger)
     add_handlers(app)
     contract.add_contract(app)
+    app.add_middleware(Doorkeeper, access=access)
     return app
 
 

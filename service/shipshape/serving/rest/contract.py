@@ -23,6 +23,7 @@ from shipshape.serving.rest.schemas import (
 REF = "#/components/schemas/{model}"
 REQUESTS: Sequence[type[BaseModel]] = (ContactBody, RecogniseBody, ScanBody, Problem)
 _PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": REF.format(model="Problem")}}}
+_SCHEMES = {"token": {"type": "http", "scheme": "bearer", "description": "Where the service asks for tokens."}}
 _TIMEOUT = {
     "name": TIMEOUT_HEADER,
     "in": "header",
@@ -73,6 +74,8 @@ def add_contract(app: FastAPI) -> None:
             )
             _, definitions = models_json_schema([(model, "validation") for model in REQUESTS], ref_template=REF)
             schema.setdefault("components", {}).setdefault("schemas", {}).update(definitions["$defs"])
+            schema["components"]["securitySchemes"] = _SCHEMES
+            schema["security"] = [{}, *({name: []} for name in _SCHEMES)]  # with or without
             app.openapi_schema = schema
         return app.openapi_schema
 

@@ -19,6 +19,7 @@ STATUS = {
     FaultKind.DEADLINE_EXCEEDED: 504,
     FaultKind.CANCELLED: 499,  # not registered, but what proxies log for a client that left
     FaultKind.NOT_READY: 503,
+    FaultKind.UNAUTHENTICATED: 401,
     FaultKind.INTERNAL: 500,
 }
 MEDIA_TYPE = "application/problem+json"
@@ -40,6 +41,8 @@ def problem(fault: Fault) -> Response:
     if fault.retry_after_s is not None:
         response.headers["Retry-After"] = str(max(1, math.ceil(fault.retry_after_s)))  # whole seconds, by its RFC
         response.headers[RETRY_HEADER] = str(math.ceil(fault.retry_after_s * 1e3))
+    if fault.kind is FaultKind.UNAUTHENTICATED:
+        response.headers["WWW-Authenticate"] = "Bearer"
     return response
 
 

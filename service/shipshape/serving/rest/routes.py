@@ -9,6 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from shipshape.errors import NotReady
 from shipshape.executor import Lane, Ticket
+from shipshape.serving.clients import Clients, Share
 from shipshape.serving.core import Answer, Core, Scan, conclude, outcome_of
 from shipshape.serving.encoding import Wishes
 from shipshape.serving.faults import FaultKind, fault_of
@@ -31,7 +32,7 @@ from shipshape.serving.rest.waiting import until_settled
 from shipshape.serving.timing import Timeouts, server_timing
 from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
 
-Handler = Callable[[Request, Outcome], Awaitable[Response]]
+Handler = Callable[[Request, Outcome, Share], Awaitable[Response]]
 T = TypeVar("T")
 SMALL_BYTES = 64 * 2**10  # of a body: JSON of this size is parsed in under a millisecond
 SMALL_SCAN = 32  # contacts: written in under a millisecond
@@ -40,10 +41,11 @@ SMALL_SCAN = 32  # contacts: written in under a millisecond
 class Routes:
     """One method a path. Large bodies are parsed and written off the event loop."""
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts) -> None:
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, clients: Clients) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
+        self._clients = clients
         self._bodies = Bodies(core.limits)
 
     async def recognise(self, request: Request) -> Response:
@@ -83,7 +85,8 @@ class Routes:
         given = identify(request)
         with self._metrics.request("rest", method) as outcome:
             try:
-                response = await handle(request, outcome)
+                with self._clients.share(request.state.client) as share:
+                    response = await handle(request, outcome, share)
             except HTTPException:  # its answer is the handlers' matter
                 outcome.kind = FaultKind.INVALID_INPUT
                 raise
@@ -94,8 +97,9 @@ class Routes:
         response.headers[ID_HEADER] = given
         return response
 
-    async def _recognise(self, request: Request, outcome: Outcome) -> Response:
+    async def _recognise(self, request: Request, outcome: Outcome, share: Share) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
+        share.take(1)
         parse = parse_packed if media_type(request, JSON, PACKED) == PACKED else parse_json
         deadline = self._core.deadline_in(seconds)
         async with self._bodies.read(request, seconds) as body:
@@ -111,7 +115,7 @@ class Routes:
         outcome.kind = outcome_of(answer)
         return await _run(lambda: self._single(answer, wishes), small=not _bulky(wishes))
 
-    async def _scan(self, request: Request, outcome: Outcome) -> Response:
+    async def _scan(self, request: Request, outcome: Outcome, share: Share) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
         media_type(request, JSON)
         deadline = self._core.deadline_in(seconds)
@@ -120,6 +124,7 @@ class Routes:
             def submit() -> tuple[list[str], Scan, Wishes]:
                 parsed = parse_scan(body, request.query_params)
                 outcome.contacts = len(parsed.contacts)
+                share.take(min(outcome.contacts, self._core.limits.max_contacts))
                 ids, contacts, wishes = decode_scan(parsed, self._core.limits)
                 return ids, self._core.submit_scan(model, contacts, wishes, deadline), wishes
 
@@ -129,11 +134,11 @@ class Routes:
         small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
         return await _run(lambda: self._many(ids, scan, wishes), small=small)
 
-    async def _model(self, _request: Request, _: Outcome) -> Response:
+    async def _model(self, _request: Request, _: Outcome, _share: Share) -> Response:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
         return _json(answers.to_bytes(value))
 
-    async def _capacity(self, request: Request, _: Outcome) -> Response:
+    async def _capacity(self, request: Request, _: Outcome, _share: Share) -> Response:
         asked = parse_capacity(request.query_params)
         capacity = self._core.capacity(asked.points, asked.lane)
         return _json(answers.to_bytes(answers.from_capacity(capacity, self._metrics.budget.report())))
