@@ -9,13 +9,23 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from shipshape.serving.faults import FaultKind
+from shipshape.serving.rest.headers import TIMEOUT_HEADER
 from shipshape.serving.rest.problems import MEDIA_TYPE, STATUS
-from shipshape.serving.rest.requests import JSON, PACKED, TIMEOUT_HEADER
-from shipshape.serving.rest.schemas import ContactBody, Problem, QueryFields, RecogniseBody, ScanBody
+from shipshape.serving.rest.requests import JSON, NPY, PACKED, POINTCLOUD2
+from shipshape.serving.rest.schemas import (
+    ContactBody,
+    PointCloud2Fields,
+    Problem,
+    QueryFields,
+    RecogniseBody,
+    ScanBody,
+    ScanQueryFields,
+)
 
 REF = "#/components/schemas/{model}"
 REQUESTS: Sequence[type[BaseModel]] = (ContactBody, RecogniseBody, ScanBody, Problem)
 _PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": REF.format(model="Problem")}}}
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
 _TIMEOUT = {
     "name": TIMEOUT_HEADER,
     "in": "header",
@@ -27,15 +37,14 @@ _TIMEOUT = {
 
 def recognise_extra() -> dict[str, Any]:
     """Body and parameters of /v1/recognise."""
-    packed = {"schema": {"type": "string", "format": "binary"}}
-    body = {JSON: {"schema": {"$ref": REF.format(model="RecogniseBody")}}, PACKED: packed}
-    return {"requestBody": _body(body), "parameters": [_TIMEOUT, *_query()]}
+    body = {JSON: _json("RecogniseBody"), PACKED: _BINARY, NPY: _BINARY, POINTCLOUD2: _BINARY}
+    return {"requestBody": _body(body), "parameters": [_TIMEOUT, *_query(PointCloud2Fields)]}
 
 
 def scan_extra() -> dict[str, Any]:
     """Body and parameters of /v1/scan."""
-    body = {JSON: {"schema": {"$ref": REF.format(model="ScanBody")}}}
-    return {"requestBody": _body(body), "parameters": [_TIMEOUT]}
+    body = {JSON: _json("ScanBody"), PACKED: _BINARY}
+    return {"requestBody": _body(body), "parameters": [_TIMEOUT, *_query(ScanQueryFields)]}
 
 
 def problems(*kinds: FaultKind) -> dict[int | str, dict[str, Any]]:
@@ -71,14 +80,25 @@ def _body(content: dict[str, Any]) -> dict[str, Any]:
     return {"required": True, "content": content}
 
 
-def _query() -> list[dict[str, Any]]:
-    schema = QueryFields.model_json_schema(ref_template=REF)
+def _json(model: str) -> dict[str, Any]:
+    return {"schema": {"$ref": REF.format(model=model)}}
+
+
+def _query(fields: type[BaseModel]) -> list[dict[str, Any]]:
+    schema = fields.model_json_schema(ref_template=REF)
     return [
         {
             "name": name,
             "in": "query",
-            "description": f"Only beside {PACKED}: {field.pop('description', name)}",
+            "description": f"{_beside(name)}: {field.pop('description', name)}",
             "schema": field,
         }
         for name, field in schema["properties"].items()
     ]
+
+
+def _beside(name: str) -> str:
+    """Which bodies a parameter of the query goes with; beside JSON there is none."""
+    if name in PointCloud2Fields.model_fields and name not in QueryFields.model_fields:
+        return f"Only beside {POINTCLOUD2}"
+    return f"Not beside {JSON}"

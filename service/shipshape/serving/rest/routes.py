@@ -1,6 +1,6 @@
 """The handlers of the REST door: translate, delegate to the core, translate back."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, TypeVar
 
 from fastapi import HTTPException, Request, Response
@@ -10,21 +10,13 @@ from starlette.concurrency import run_in_threadpool
 from shipshape.errors import NotReady
 from shipshape.executor import Ticket
 from shipshape.serving.core import Answer, Core, Scan, conclude
-from shipshape.serving.encoding import Wishes
+from shipshape.serving.encoding import Wishes, check_contacts
 from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.rest import answers
 from shipshape.serving.rest.bodies import Bodies
+from shipshape.serving.rest.headers import media_type, timeout_s
 from shipshape.serving.rest.problems import ID_HEADER, identify, problem
-from shipshape.serving.rest.requests import (
-    JSON,
-    PACKED,
-    decode_scan,
-    media_type,
-    parse_json,
-    parse_packed,
-    parse_scan,
-    timeout_s,
-)
+from shipshape.serving.rest.requests import CONTACT_FORMS, JSON, SCAN_FORMS
 from shipshape.serving.rest.waiting import until_settled
 from shipshape.serving.timing import Timeouts, server_timing
 from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
@@ -45,7 +37,7 @@ class Routes:
         self._bodies = Bodies(core.limits)
 
     async def recognise(self, request: Request) -> Response:
-        """One contact: JSON, or packed points with everything else in the query."""
+        """One contact: JSON, or its points in a binary form with everything else in the query."""
         return await self._guarded(request, SINGLE, self._recognise)
 
     async def scan(self, request: Request) -> Response:
@@ -90,7 +82,7 @@ class Routes:
 
     async def _recognise(self, request: Request, _: Outcome) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
-        parse = parse_packed if media_type(request, JSON, PACKED) == PACKED else parse_json
+        parse = CONTACT_FORMS[media_type(request, *CONTACT_FORMS)]
         deadline = self._core.deadline_in(seconds)
         async with self._bodies.read(request, seconds) as body:
 
@@ -104,15 +96,16 @@ class Routes:
 
     async def _scan(self, request: Request, outcome: Outcome) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
-        media_type(request, JSON)
+        parse = SCAN_FORMS[media_type(request, *SCAN_FORMS)]
         deadline = self._core.deadline_in(seconds)
         async with self._bodies.read(request, seconds) as body:
 
-            def submit() -> tuple[list[str], Scan, Wishes]:
-                parsed = parse_scan(body, request.query_params)
-                outcome.contacts = len(parsed.contacts)
-                ids, contacts, wishes = decode_scan(parsed, self._core.limits)
-                return ids, self._core.submit_scan(model, contacts, wishes, deadline), wishes
+            def submit() -> tuple[Sequence[str], Scan, Wishes]:
+                parsed = parse(body, request.query_params, self._core.limits)
+                outcome.contacts = parsed.count
+                check_contacts(parsed.count, self._core.limits)
+                scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, deadline)
+                return parsed.contact_ids, scan, parsed.wishes
 
             ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         await until_settled(scan.tickets, request)
@@ -123,7 +116,7 @@ class Routes:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
         return _json(answers.to_bytes(value))
 
-    def _many(self, ids: list[str], scan: Scan, wishes: Wishes) -> Response:
+    def _many(self, ids: Sequence[str], scan: Scan, wishes: Wishes) -> Response:
         outcomes, stage_ms = conclude(scan, "rest", self._metrics)
         return _json(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), server_timing(stage_ms))
 
