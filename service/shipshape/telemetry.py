@@ -19,6 +19,7 @@ STAGE_BUCKETS = (5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3, 
 REQUEST_BUCKETS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 25e-3, 35e-3, 50e-3, 70e-3, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 OK, CANCELLED, INTERNAL = "ok", "cancelled", "internal"
 SINGLE, SCAN = "recognise", "recognise_scan"  # the methods whose request is one contact, and many
+STREAM = "recognise_stream"  # each of its messages counts as a request of many contacts
 
 request_id: ContextVar[str] = ContextVar("request_id", default="")
 _logger = logging.getLogger(__name__)

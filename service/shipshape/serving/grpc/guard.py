@@ -1,6 +1,6 @@
 """What every RPC of shipshape.v1 passes: limits, parsing, metrics, request id, and the one table of errors."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NoReturn
 
 import grpc
@@ -8,8 +8,8 @@ from google.protobuf.message import DecodeError
 
 from shipshape.errors import InvalidInput
 from shipshape.serving.encoding import Limits, check_body
-from shipshape.serving.faults import FaultKind, fault_of
-from shipshape.telemetry import SCAN, SINGLE, Metrics, new_request_id, request_id
+from shipshape.serving.faults import Fault, FaultKind, fault_of
+from shipshape.telemetry import SCAN, SINGLE, STREAM, Metrics, new_request_id, request_id
 
 STATUS = {
     FaultKind.INVALID_INPUT: grpc.StatusCode.INVALID_ARGUMENT,
@@ -24,6 +24,7 @@ STATUS = {
 METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info"}
 PREFIX = "/shipshape.v1.Shipshape/"
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
+StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Iterator[Any]]
 
 
 class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
@@ -38,8 +39,13 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         handler = continuation(handler_call_details)
         if handler is None or not handler_call_details.method.startswith(PREFIX):
             return handler
-        method = METHODS[handler_call_details.method.removeprefix(PREFIX)]
         # No deserializer: gRPC would answer INTERNAL to bytes that do not parse, and that is not our fault.
+        if handler.request_streaming:
+            return grpc.stream_stream_rpc_method_handler(
+                self._guarded_stream(handler.stream_stream, handler.request_deserializer),
+                response_serializer=handler.response_serializer,
+            )
+        method = METHODS[handler_call_details.method.removeprefix(PREFIX)]
         return grpc.unary_unary_rpc_method_handler(
             self._guarded(handler.unary_unary, handler.request_deserializer, method),
             response_serializer=handler.response_serializer,
@@ -58,10 +64,30 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
-                    set_trailing(context, ("shipshape-error", fault.kind))
-                    _abort(context, STATUS[fault.kind], fault.message)
+                    _abort(context, fault)
 
         return call
+
+    def _guarded_stream(self, behaviour: StreamBehaviour, parse: Callable[[bytes], Any]) -> StreamBehaviour:
+        def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Iterator[Any]:
+            new_request_id(_proposed_id(context))
+            set_trailing(context)
+            try:
+                yield from behaviour(self._messages(raws, parse), context)
+            except (
+                Exception
+            ) as error:  # what a message alone gets wrong is answered in the stream, and counted there
+                fault = fault_of(error)
+                with self._metrics.request("grpc", STREAM) as outcome:
+                    outcome.kind = fault.kind
+                _abort(context, fault)
+
+        return call
+
+    def _messages(self, raws: Iterator[bytes], parse: Callable[[bytes], Any]) -> Iterator[Any]:
+        for raw in raws:
+            check_body(len(raw), self._limits)
+            yield _parsed(raw, parse)
 
 
 def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str]) -> None:
@@ -78,8 +104,9 @@ def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:
         ) from error
 
 
-def _abort(context: grpc.ServicerContext, code: grpc.StatusCode, message: str) -> NoReturn:
-    context.abort(code, message)
+def _abort(context: grpc.ServicerContext, fault: Fault) -> NoReturn:
+    set_trailing(context, ("shipshape-error", fault.kind))
+    context.abort(STATUS[fault.kind], fault.message)
     raise AssertionError("unreachable: abort raises")
 
 
