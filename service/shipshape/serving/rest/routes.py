@@ -1,6 +1,6 @@
 """The handlers of the REST door: translate, delegate to the core, translate back."""
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from fastapi import HTTPException, Request, Response
@@ -15,6 +15,7 @@ from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.rest import answers
 from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.headers import media_type, timeout_s
+from shipshape.serving.rest.json_process import JsonProcess, Parse
 from shipshape.serving.rest.problems import ID_HEADER, identify, problem
 from shipshape.serving.rest.requests import CONTACT_FORMS, JSON, SCAN_FORMS
 from shipshape.serving.rest.waiting import until_settled
@@ -24,17 +25,26 @@ from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
 Handler = Callable[[Request, Outcome], Awaitable[Response]]
 T = TypeVar("T")
 SMALL_BYTES = 64 * 2**10  # of a body: JSON of this size is parsed in under a millisecond
+LARGE_JSON_BYTES = 256 * 2**10  # some 4,000 points: no thread holds the loop up for more than 3 ms over it
 SMALL_SCAN = 32  # contacts: written in under a millisecond
 
 
 class Routes:
-    """One method a path. Large bodies are parsed and written off the event loop."""
+    """One method a path. Large bodies are parsed and written off the event loop.
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts) -> None:
+    Args:
+        core: Answers.
+        metrics: Told of every request.
+        timeouts: Deadline of requests that set none.
+        json: Parses large JSON.
+    """
+
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, json: JsonProcess) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
         self._bodies = Bodies(core.limits)
+        self._json = json
 
     async def recognise(self, request: Request) -> Response:
         """One contact: JSON, or its points in a binary form with everything else in the query."""
@@ -82,12 +92,13 @@ class Routes:
 
     async def _recognise(self, request: Request, _: Outcome) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
-        parse = CONTACT_FORMS[media_type(request, *CONTACT_FORMS)]
+        form = media_type(request, *CONTACT_FORMS)
         deadline = self._core.deadline_in(seconds)
         async with self._bodies.read(request, seconds) as body:
+            parse = await self._parser(form, CONTACT_FORMS[form], body, request.query_params, deadline)
 
             def submit() -> tuple[Ticket[Answer], Wishes]:
-                contact, wishes = parse(body, request.query_params, self._core.limits)
+                contact, wishes = parse()
                 return self._core.submit(model, contact, wishes, deadline), wishes
 
             ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
@@ -96,12 +107,13 @@ class Routes:
 
     async def _scan(self, request: Request, outcome: Outcome) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
-        parse = SCAN_FORMS[media_type(request, *SCAN_FORMS)]
+        form = media_type(request, *SCAN_FORMS)
         deadline = self._core.deadline_in(seconds)
         async with self._bodies.read(request, seconds) as body:
+            parse = await self._parser(form, SCAN_FORMS[form], body, request.query_params, deadline)
 
             def submit() -> tuple[Sequence[str], Scan, Wishes]:
-                parsed = parse(body, request.query_params, self._core.limits)
+                parsed = parse()
                 outcome.contacts = parsed.count
                 check_contacts(parsed.count, self._core.limits)
                 scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, deadline)
@@ -111,6 +123,15 @@ class Routes:
         await until_settled(scan.tickets, request)
         small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
         return await _run(lambda: self._many(ids, scan, wishes), small=small)
+
+    async def _parser(
+        self, form: str, parse: Parse[T], body: bytes, query: Mapping[str, str], deadline: float
+    ) -> Callable[[], T]:
+        """Gives the parsed body: large JSON is parsed before, in another process, all else when it is called."""
+        if form == JSON and len(body) > LARGE_JSON_BYTES:
+            parsed = await self._json.parse(parse, body, query, self._core.seconds_until(deadline))
+            return lambda: parsed
+        return lambda: parse(body, query, self._core.limits)
 
     async def _model(self, _request: Request, _: Outcome) -> Response:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)

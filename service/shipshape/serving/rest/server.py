@@ -43,7 +43,7 @@ class RestDoor:
             h11_max_incomplete_event_size=HEADER_BYTES,
             timeout_keep_alive=KEEP_ALIVE_S,
             ws="none",
-            lifespan="off",
+            lifespan="on",
             server_header=False,
         )
         self._server = uvicorn.Server(config)
