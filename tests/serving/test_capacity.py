@@ -119,7 +119,7 @@ def test_every_answer_carries_the_load(doors):
     text = doors.ask_rest(POINTS).headers["endpoint-load-metrics"]
     assert text == "TEXT application_utilization=0.000"
     context, core, metrics = Context(), doors.service._core, doors.service._metrics
-    Servicer(core, metrics, Timeouts()).Recognise(request(POINTS), context)
+    Servicer(core, metrics, Timeouts(), doors.service._grpc._streams).Recognise(request(POINTS), context)
     report = orca().FromString(context.trailing["endpoint-load-metrics-bin"])
     assert 0.0 <= report.application_utilization <= 1.0
 

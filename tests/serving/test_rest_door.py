@@ -143,7 +143,13 @@ def test_the_frameworks_refusals_have_an_id(doors):
 def test_another_media_type_is_refused(doors):
     response = doors.rest.post("/v1/recognise", content=b"x", headers={"content-type": "text/csv"})
     assert response.status_code == 415
-    assert "application/json or application/octet-stream, got text/csv" in response.json()["detail"]
+    assert response.json()["detail"] == (
+        "expected a body of type application/json, application/octet-stream, application/x-npy "
+        "or application/vnd.shipshape.pointcloud2, got text/csv"
+    )
+    response = doors.rest.post("/v1/scan", content=b"x")
+    assert response.status_code == 415
+    assert "type application/json or application/octet-stream, got none" in response.json()["detail"]
 
 
 def test_a_problem_document_is_complete(doors):

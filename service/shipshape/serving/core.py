@@ -182,6 +182,10 @@ class Core:
         """The moment `seconds` from now on the executor's clock, as `submit` and `submit_scan` take it."""
         return self._executor.clock() + seconds
 
+    def seconds_until(self, deadline: float) -> float:
+        """What is left until a moment from `deadline_in`, never negative."""
+        return max(0.0, deadline - self._executor.clock())
+
     def model(self) -> Model:
         """The running model, for a request to take at its start: what began before a stop is still answered.
 

@@ -71,7 +71,7 @@ def points_from_bytes(packed: bytes, limits: Limits) -> Float32[np.ndarray, "n 3
             f"expected {POINT_BYTES} bytes a point (little-endian float32 x, y, z), "
             f"got {len(packed)} bytes, {len(packed) % POINT_BYTES} too many for whole points"
         )
-    _check_points(len(packed) // POINT_BYTES, limits)
+    check_points(len(packed) // POINT_BYTES, limits)
     return np.frombuffer(packed, PACKED).reshape(-1, 3).astype(np.float32)
 
 
@@ -93,13 +93,13 @@ def points_from_rows(rows: Any, limits: Limits) -> Float32[np.ndarray, "n 3"]:
     """
     if not isinstance(rows, list):
         raise InvalidInput(f"expected points to be a list of [x, y, z], got {_kind(rows)}")
-    _check_points(len(rows), limits)
+    check_points(len(rows), limits)
     if not rows:
         return np.empty((0, 3), np.float32)
     for index, row in enumerate(rows):
         if not isinstance(row, list) or len(row) != 3:
             raise InvalidInput(f"expected three numbers in points[{index}], got {_kind(row)}")
-    return _to_float32(rows)
+    return _numbers(rows)
 
 
 def make_contact(
@@ -133,9 +133,21 @@ def check_contacts(count: int, limits: Limits) -> None:
         raise TooLarge(f"expected at most {limits.max_contacts} contacts in a scan, got {count}")
 
 
+def check_points(count: int, limits: Limits) -> None:
+    """Raises TooLarge when a contact of `count` points is over the limit."""
+    if count > limits.max_points:
+        raise TooLarge(f"expected at most {limits.max_points} points in a contact, got {count}")
+
+
 def pack(points: Float32[np.ndarray, "n 3"]) -> bytes:
     """The inverse of `points_from_bytes`."""
     return points.astype(PACKED).tobytes()
+
+
+def to_float32(array: np.ndarray) -> Float32[np.ndarray, "..."]:
+    """A copy in float32; what lies beyond is infinite, which the pipeline refuses."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return array.astype(np.float32, order="C")
 
 
 def flat_scores(scores: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
@@ -149,12 +161,7 @@ def flat_scores(scores: Mapping[str, Any], prefix: str = "") -> dict[str, float]
     return flat
 
 
-def _check_points(count: int, limits: Limits) -> None:
-    if count > limits.max_points:
-        raise TooLarge(f"expected at most {limits.max_points} points in a contact, got {count}")
-
-
-def _to_float32(rows: list[list[Any]]) -> Float32[np.ndarray, "n 3"]:
+def _numbers(rows: list[list[Any]]) -> Float32[np.ndarray, "n 3"]:
     # By type, not by what numpy makes of it: true and false would become 1 and 0 among numbers.
     if not set(map(type, chain.from_iterable(rows))) <= {int, float}:
         raise InvalidInput("expected only numbers in points, got something else among them")
@@ -162,8 +169,7 @@ def _to_float32(rows: list[list[Any]]) -> Float32[np.ndarray, "n 3"]:
         array = np.asarray(rows, np.float64)
     except OverflowError:  # an integer beyond float64
         array = np.asarray([[_to_float(number) for number in row] for row in rows], np.float64)
-    with np.errstate(over="ignore"):  # beyond float32 is infinite, which the pipeline refuses
-        return array.astype(np.float32)
+    return to_float32(array)
 
 
 def _to_float(number: int | float) -> float:

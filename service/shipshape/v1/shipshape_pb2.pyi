@@ -153,6 +153,30 @@ class RecogniseScanResponse(_message.Message):
     results: _containers.RepeatedCompositeFieldContainer[ContactResult]
     def __init__(self, results: _Optional[_Iterable[_Union[ContactResult, _Mapping]]] = ...) -> None: ...
 
+class RecogniseStreamRequest(_message.Message):
+    __slots__ = ("sequence", "contacts", "options", "timeout_ms")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    CONTACTS_FIELD_NUMBER: _ClassVar[int]
+    OPTIONS_FIELD_NUMBER: _ClassVar[int]
+    TIMEOUT_MS_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    contacts: _containers.RepeatedCompositeFieldContainer[Contact]
+    options: Options
+    timeout_ms: float
+    def __init__(self, sequence: _Optional[int] = ..., contacts: _Optional[_Iterable[_Union[Contact, _Mapping]]] = ..., options: _Optional[_Union[Options, _Mapping]] = ..., timeout_ms: _Optional[float] = ...) -> None: ...
+
+class RecogniseStreamResponse(_message.Message):
+    __slots__ = ("sequence", "results", "error", "stages")
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    RESULTS_FIELD_NUMBER: _ClassVar[int]
+    ERROR_FIELD_NUMBER: _ClassVar[int]
+    STAGES_FIELD_NUMBER: _ClassVar[int]
+    sequence: int
+    results: _containers.RepeatedCompositeFieldContainer[ContactResult]
+    error: ContactError
+    stages: _containers.RepeatedCompositeFieldContainer[StageTime]
+    def __init__(self, sequence: _Optional[int] = ..., results: _Optional[_Iterable[_Union[ContactResult, _Mapping]]] = ..., error: _Optional[_Union[ContactError, _Mapping]] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ...) -> None: ...
+
 class ContactResult(_message.Message):
     __slots__ = ("contact_id", "recognition", "error")
     CONTACT_ID_FIELD_NUMBER: _ClassVar[int]
@@ -331,18 +355,20 @@ class CatalogueVessel(_message.Message):
     def __init__(self, name: _Optional[str] = ..., length: _Optional[float] = ..., beam: _Optional[float] = ..., height: _Optional[float] = ...) -> None: ...
 
 class Limits(_message.Message):
-    __slots__ = ("max_body_bytes", "max_points", "max_contacts", "default_timeout_ms", "budget_ms")
+    __slots__ = ("max_body_bytes", "max_points", "max_contacts", "default_timeout_ms", "budget_ms", "max_streams")
     MAX_BODY_BYTES_FIELD_NUMBER: _ClassVar[int]
     MAX_POINTS_FIELD_NUMBER: _ClassVar[int]
     MAX_CONTACTS_FIELD_NUMBER: _ClassVar[int]
     DEFAULT_TIMEOUT_MS_FIELD_NUMBER: _ClassVar[int]
     BUDGET_MS_FIELD_NUMBER: _ClassVar[int]
+    MAX_STREAMS_FIELD_NUMBER: _ClassVar[int]
     max_body_bytes: int
     max_points: int
     max_contacts: int
     default_timeout_ms: float
     budget_ms: float
-    def __init__(self, max_body_bytes: _Optional[int] = ..., max_points: _Optional[int] = ..., max_contacts: _Optional[int] = ..., default_timeout_ms: _Optional[float] = ..., budget_ms: _Optional[float] = ...) -> None: ...
+    max_streams: int
+    def __init__(self, max_body_bytes: _Optional[int] = ..., max_points: _Optional[int] = ..., max_contacts: _Optional[int] = ..., default_timeout_ms: _Optional[float] = ..., budget_ms: _Optional[float] = ..., max_streams: _Optional[int] = ...) -> None: ...
 
 class GetCapacityRequest(_message.Message):
     __slots__ = ("points", "lane")

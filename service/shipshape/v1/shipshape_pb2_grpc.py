@@ -44,6 +44,11 @@ class ShipshapeStub:
                 request_serializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseScanRequest.SerializeToString,
                 response_deserializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseScanResponse.FromString,
                 _registered_method=True)
+        self.RecogniseStream = channel.stream_stream(
+                '/shipshape.v1.Shipshape/RecogniseStream',
+                request_serializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseStreamRequest.SerializeToString,
+                response_deserializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseStreamResponse.FromString,
+                _registered_method=True)
         self.GetModelInfo = channel.unary_unary(
                 '/shipshape.v1.Shipshape/GetModelInfo',
                 request_serializer=shipshape_dot_v1_dot_shipshape__pb2.GetModelInfoRequest.SerializeToString,
@@ -68,6 +73,18 @@ class ShipshapeServicer:
 
     def RecogniseScan(self, request, context):
         """Many contacts of one scan, admitted together or not at all; a bad contact does not spoil the others.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def RecogniseStream(self, request_iterator, context):
+        """Many messages of contacts in one long call, each answered as soon as it is finished, in any order. When contacts
+        of `Limits.max_contacts` or more are under way, the service reads on only after answers were taken; a message
+        that is refused, late or wrong gets an error of its own and the stream goes on. After the caller's last message
+        come all answers, then OK. RESOURCE_EXHAUSTED beyond `Limits.max_streams`. UNAVAILABLE when the service stops,
+        after the answers to all that it had read: send the rest elsewhere. INVALID_ARGUMENT, after those answers too, for
+        bytes that are no message or over `Limits.max_body_bytes`: nobody can tell which sequence an answer would need.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -99,6 +116,11 @@ def add_ShipshapeServicer_to_server(servicer, server):
                     servicer.RecogniseScan,
                     request_deserializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseScanRequest.FromString,
                     response_serializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseScanResponse.SerializeToString,
+            ),
+            'RecogniseStream': grpc.stream_stream_rpc_method_handler(
+                    servicer.RecogniseStream,
+                    request_deserializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseStreamRequest.FromString,
+                    response_serializer=shipshape_dot_v1_dot_shipshape__pb2.RecogniseStreamResponse.SerializeToString,
             ),
             'GetModelInfo': grpc.unary_unary_rpc_method_handler(
                     servicer.GetModelInfo,
@@ -165,6 +187,33 @@ class Shipshape:
             '/shipshape.v1.Shipshape/RecogniseScan',
             shipshape_dot_v1_dot_shipshape__pb2.RecogniseScanRequest.SerializeToString,
             shipshape_dot_v1_dot_shipshape__pb2.RecogniseScanResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def RecogniseStream(request_iterator,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.stream_stream(
+            request_iterator,
+            target,
+            '/shipshape.v1.Shipshape/RecogniseStream',
+            shipshape_dot_v1_dot_shipshape__pb2.RecogniseStreamRequest.SerializeToString,
+            shipshape_dot_v1_dot_shipshape__pb2.RecogniseStreamResponse.FromString,
             options,
             channel_credentials,
             insecure,

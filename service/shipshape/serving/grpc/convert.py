@@ -114,7 +114,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
         preset=_PRESET_NUMBERS[found.preset],
         image_method=_IMAGE_METHOD_NUMBERS[found.image_method] if found.image_method else None,
         bundle=found.bundle,
-        stages=[pb.StageTime(stage=stage, milliseconds=ms) for stage, ms in found.stage_ms.items()],
+        stages=from_stage_ms(found.stage_ms),
         rendered_png=answer.png,
     )
     if wishes.restored:
@@ -130,13 +130,30 @@ def from_outcomes(
 ) -> pb.RecogniseScanResponse:
     """The message of a scan's outcomes, in the order of its contacts."""
     response = pb.RecogniseScanResponse()
+    add_results(response.results, contact_ids, outcomes, wishes)
+    return response
+
+
+def add_results(
+    results: Any, contact_ids: Iterable[str], outcomes: Sequence[Answer | Fault], wishes: Wishes
+) -> None:
+    """Put the outcomes into the repeated ContactResult of a message, in the order of its contacts."""
     for contact_id, outcome in zip(contact_ids, outcomes, strict=True):
-        result = response.results.add(contact_id=contact_id)
+        result = results.add(contact_id=contact_id)
         if isinstance(outcome, Fault):
-            result.error.CopyFrom(pb.ContactError(kind=ERROR_KINDS[outcome.kind], message=outcome.message))
+            result.error.CopyFrom(from_fault(outcome))
         else:
             result.recognition.CopyFrom(from_answer(outcome, wishes))
-    return response
+
+
+def from_fault(fault: Fault) -> pb.ContactError:
+    """The message of a fault."""
+    return pb.ContactError(kind=ERROR_KINDS[fault.kind], message=fault.message)
+
+
+def from_stage_ms(stage_ms: Mapping[str, float]) -> list[pb.StageTime]:
+    """The messages of each stage's milliseconds."""
+    return [pb.StageTime(stage=stage, milliseconds=ms) for stage, ms in stage_ms.items()]
 
 
 def from_model(model: Model, version: str) -> pb.GetModelInfoResponse:

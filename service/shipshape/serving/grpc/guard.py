@@ -1,7 +1,7 @@
 """What every RPC of shipshape.v1 passes: limits, parsing, metrics, request id, and the one table of errors."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NoReturn
 
 import grpc
@@ -12,7 +12,7 @@ from shipshape.serving.access import Access
 from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.serving.grpc.callers import client_of
-from shipshape.telemetry import DEGRADED, SCAN, SINGLE, Metrics, new_request_id, request_id
+from shipshape.telemetry import DEGRADED, SCAN, SINGLE, STREAM, Metrics, new_request_id, request_id
 from shipshape.types import Rung
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -30,6 +30,7 @@ STATUS = {
 METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info", "GetCapacity": "capacity"}
 PREFIX = "/shipshape.v1.Shipshape/"
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
+StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Iterator[Any]]
 
 
 class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
@@ -45,8 +46,13 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         handler = continuation(handler_call_details)
         if handler is None or not handler_call_details.method.startswith(PREFIX):
             return handler
-        method = METHODS[handler_call_details.method.removeprefix(PREFIX)]
         # No deserializer: gRPC would answer INTERNAL to bytes that do not parse, and that is not our fault.
+        if handler.request_streaming:
+            return grpc.stream_stream_rpc_method_handler(
+                self._guarded_stream(handler.stream_stream, handler.request_deserializer),
+                response_serializer=handler.response_serializer,
+            )
+        method = METHODS[handler_call_details.method.removeprefix(PREFIX)]
         return grpc.unary_unary_rpc_method_handler(
             self._guarded(handler.unary_unary, handler.request_deserializer, method),
             response_serializer=handler.response_serializer,
@@ -74,6 +80,27 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                 return response
 
         return call
+
+    def _guarded_stream(self, behaviour: StreamBehaviour, parse: Callable[[bytes], Any]) -> StreamBehaviour:
+        def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Iterator[Any]:
+            identify(context)
+            set_trailing(context)
+            try:
+                yield from behaviour(self._messages(raws, parse), context)
+            except (
+                Exception
+            ) as error:  # what a message alone gets wrong is answered in the stream, and counted there
+                fault = fault_of(error)
+                with self._metrics.request("grpc", STREAM) as outcome:
+                    outcome.kind = fault.kind
+                refuse(context, fault)
+
+        return call
+
+    def _messages(self, raws: Iterator[bytes], parse: Callable[[bytes], Any]) -> Iterator[Any]:
+        for raw in raws:
+            check_body(len(raw), self._limits)
+            yield _parsed(raw, parse)
 
 
 def identify(context: grpc.ServicerContext) -> None:

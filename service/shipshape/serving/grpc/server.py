@@ -12,6 +12,7 @@ from shipshape.serving.grpc.doorkeeper import Doorkeeper, credentials
 from shipshape.serving.grpc.guard import Guard
 from shipshape.serving.grpc.reflection import PLACES, add_reflection
 from shipshape.serving.grpc.servicer import Servicer
+from shipshape.serving.grpc.streams import STREAMS, Streams
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2, shipshape_pb2_grpc
@@ -30,8 +31,8 @@ class GrpcDoor:
         timeouts: Deadline of callers that set none.
         access: Who may come in.
         waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
-            executor's queue, which is bounded and refuses, is where they wait; reflection streams, which hold
-            a thread each as well, are bounded for the same reason.
+            executor's queue, which is bounded and refuses, is where they wait; streams of contacts and of
+            reflection, which hold a thread each as well, are bounded for the same reason.
     """
 
     def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, *, waiting: int) -> None:
@@ -39,7 +40,7 @@ class GrpcDoor:
         self._tls = access.tls
         self._health = health.HealthServicer()
         self._server = grpc.server(
-            ThreadPoolExecutor(waiting + SPARE_THREADS, thread_name_prefix="grpc"),
+            ThreadPoolExecutor(waiting + SPARE_THREADS + STREAMS, thread_name_prefix="grpc"),
             interceptors=[Doorkeeper(access), Guard(metrics, limits, access)],
             options=[
                 ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
@@ -47,7 +48,8 @@ class GrpcDoor:
                 ("grpc.max_send_message_length", -1),
             ],
         )
-        servicer = Servicer(core, metrics, timeouts)
+        self._streams = Streams(core, metrics, timeouts, access)
+        servicer = Servicer(core, metrics, timeouts, self._streams)
         shipshape_pb2_grpc.add_ShipshapeServicer_to_server(servicer, self._server)  # type: ignore[no-untyped-call]
         health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
         add_reflection((SERVICE, health.SERVICE_NAME), self._server)
@@ -83,6 +85,7 @@ class GrpcDoor:
 
         Called again, it shortens what is left of `drain_s`.
         """
+        self._streams.stop()
         return self._server.stop(drain_s)
 
     def _set(self, status: int) -> None:

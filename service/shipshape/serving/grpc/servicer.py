@@ -1,6 +1,6 @@
 """shipshape.v1.Shipshape: translate, delegate to the core, translate back."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -11,6 +11,7 @@ from shipshape.serving.core import Core, conclude
 from shipshape.serving.encoding import check_contacts
 from shipshape.serving.grpc import convert
 from shipshape.serving.grpc.guard import set_trailing
+from shipshape.serving.grpc.streams import STREAMS, Streams
 from shipshape.serving.load_report import GRPC_TRAILER, as_message
 from shipshape.serving.timing import LONGEST_MS, Timeouts, server_timing
 from shipshape.telemetry import Metrics
@@ -24,10 +25,11 @@ NEVER_S = 365 * 86400.0  # gRPC hands out centuries when the caller set no deadl
 class Servicer(pb_grpc.ShipshapeServicer):
     """The methods of the contract; errors are the guard's matter."""
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts) -> None:
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, streams: Streams) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
+        self._streams = streams
 
     def Recognise(self, request: pb.RecogniseRequest, context: grpc.ServicerContext) -> pb.RecogniseResponse:
         """One contact."""
@@ -54,6 +56,12 @@ class Servicer(pb_grpc.ShipshapeServicer):
         _set_timing(context, stage_ms, self._core.load())
         return convert.from_outcomes((contact.contact_id for contact in request.contacts), outcomes, wishes)
 
+    def RecogniseStream(
+        self, request_iterator: Iterator[pb.RecogniseStreamRequest], context: grpc.ServicerContext
+    ) -> Iterator[pb.RecogniseStreamResponse]:
+        """Many messages in one long call."""
+        return self._streams.serve(request_iterator, context)
+
     def GetModelInfo(
         self, request: pb.GetModelInfoRequest, context: grpc.ServicerContext
     ) -> pb.GetModelInfoResponse:
@@ -65,6 +73,7 @@ class Servicer(pb_grpc.ShipshapeServicer):
         info.limits.max_contacts = limits.max_contacts
         info.limits.default_timeout_ms = self._timeouts.default_ms
         info.limits.budget_ms = self._timeouts.budget_ms
+        info.limits.max_streams = STREAMS
         set_trailing(context)
         return info
 

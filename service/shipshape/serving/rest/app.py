@@ -1,5 +1,7 @@
 """The REST door as an ASGI application."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from importlib.metadata import version
 from typing import Any
 
@@ -11,6 +13,7 @@ from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.rest import contract
 from shipshape.serving.rest.doorkeeper import Doorkeeper
+from shipshape.serving.rest.json_process import JsonProcess
 from shipshape.serving.rest.problems import add_handlers
 from shipshape.serving.rest.routes import Routes
 from shipshape.serving.rest.schemas import CapacityAnswer, ModelAnswer, RecognitionAnswer, ScanAnswer
@@ -26,11 +29,17 @@ radians, except where a name ends in _deg. Packed points are little-endian float
 
 def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access) -> FastAPI:
     """The application; it answers 503 until the core is open."""
+    json = JsonProcess(core.limits)
     # The framework's documentation pages load scripts from elsewhere; the contract itself is at /openapi.json.
     app = FastAPI(
-        title="Shipshape", version=version("shipshape"), description=DESCRIPTION, docs_url=None, redoc_url=None
+        title="Shipshape",
+        version=version("shipshape"),
+        description=DESCRIPTION,
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lambda _: _until_the_listener_ends(json),
     )
-    routes = Routes(core, metrics, timeouts, access.clients)
+    routes = Routes(core, metrics, timeouts, access.clients, json)
     refusals = contract.problems(*(kind for kind in FaultKind if kind is not FaultKind.CANCELLED))
     not_ready = contract.problems(FaultKind.NOT_READY)
     stranger = contract.problems(FaultKind.UNAUTHENTICATED)
@@ -51,6 +60,12 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access) 
     contract.add_contract(app)
     app.add_middleware(Doorkeeper, access=access)
     return app
+
+
+@asynccontextmanager
+async def _until_the_listener_ends(json: JsonProcess) -> AsyncIterator[None]:
+    yield
+    json.close()
 
 
 def _api(answer: type, refusals: dict[int | str, dict[str, Any]], extra: dict[str, Any] | None) -> dict[str, Any]:

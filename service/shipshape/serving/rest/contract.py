@@ -9,21 +9,25 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from shipshape.serving.faults import FaultKind
+from shipshape.serving.rest.headers import TIMEOUT_HEADER
 from shipshape.serving.rest.problems import MEDIA_TYPE, STATUS
-from shipshape.serving.rest.requests import JSON, PACKED, TIMEOUT_HEADER
+from shipshape.serving.rest.requests import JSON, NPY, PACKED, POINTCLOUD2
 from shipshape.serving.rest.schemas import (
     CapacityFields,
     ContactBody,
+    PointCloud2Fields,
     Problem,
     QueryFields,
     RecogniseBody,
     ScanBody,
+    ScanQueryFields,
 )
 
 REF = "#/components/schemas/{model}"
 REQUESTS: Sequence[type[BaseModel]] = (ContactBody, RecogniseBody, ScanBody, Problem)
 _PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": REF.format(model="Problem")}}}
 _SCHEMES = {"token": {"type": "http", "scheme": "bearer", "description": "Where the service asks for tokens."}}
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
 _TIMEOUT = {
     "name": TIMEOUT_HEADER,
     "in": "header",
@@ -35,15 +39,14 @@ _TIMEOUT = {
 
 def recognise_extra() -> dict[str, Any]:
     """Body and parameters of /v1/recognise."""
-    packed = {"schema": {"type": "string", "format": "binary"}}
-    body = {JSON: {"schema": {"$ref": REF.format(model="RecogniseBody")}}, PACKED: packed}
-    return {"requestBody": _body(body), "parameters": [_TIMEOUT, *_query()]}
+    body = {JSON: _json("RecogniseBody"), PACKED: _BINARY, NPY: _BINARY, POINTCLOUD2: _BINARY}
+    return {"requestBody": _body(body), "parameters": [_TIMEOUT, *_query(PointCloud2Fields)]}
 
 
 def scan_extra() -> dict[str, Any]:
     """Body and parameters of /v1/scan."""
-    body = {JSON: {"schema": {"$ref": REF.format(model="ScanBody")}}}
-    return {"requestBody": _body(body), "parameters": [_TIMEOUT]}
+    body = {JSON: _json("ScanBody"), PACKED: _BINARY}
+    return {"requestBody": _body(body), "parameters": [_TIMEOUT, *_query(ScanQueryFields)]}
 
 
 def capacity_extra() -> dict[str, Any]:
@@ -86,18 +89,32 @@ def _body(content: dict[str, Any]) -> dict[str, Any]:
     return {"required": True, "content": content}
 
 
-def _query() -> list[dict[str, Any]]:
-    return _in_query(QueryFields, f"Only beside {PACKED}: ")
+def _json(model: str) -> dict[str, Any]:
+    return {"schema": {"$ref": REF.format(model=model)}}
 
 
-def _in_query(fields: type[BaseModel], note: str = "") -> list[dict[str, Any]]:
+def _query(fields: type[BaseModel]) -> list[dict[str, Any]]:
+    parameters = _in_query(fields)
+    for parameter in parameters:
+        parameter["description"] = f"{_beside(parameter['name'])}: {parameter['description']}"
+    return parameters
+
+
+def _in_query(fields: type[BaseModel]) -> list[dict[str, Any]]:
     schema = fields.model_json_schema(ref_template=REF)
     return [
         {
             "name": name,
             "in": "query",
-            "description": f"{note}{field.pop('description', name)}",
+            "description": field.pop("description", name),
             "schema": field,
         }
         for name, field in schema["properties"].items()
     ]
+
+
+def _beside(name: str) -> str:
+    """Which bodies a parameter of the query goes with; beside JSON there is none."""
+    if name in PointCloud2Fields.model_fields and name not in QueryFields.model_fields:
+        return f"Only beside {POINTCLOUD2}"
+    return f"Not beside {JSON}"

@@ -1,9 +1,9 @@
-"""A request's headers and bytes -> contacts and wishes."""
+"""A request's body and query -> contacts and wishes, in each of the forms that bodies have."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from fastapi import HTTPException, Request
 from pydantic import BaseModel, ValidationError
 from pydantic_core import from_json
 
@@ -11,53 +11,44 @@ from shipshape.errors import InvalidInput
 from shipshape.serving.encoding import (
     Limits,
     Wishes,
-    check_contacts,
     make_contact,
     make_wishes,
     points_from_base64,
     points_from_bytes,
     points_from_rows,
 )
+from shipshape.serving.encoding_counts import contacts_from_bytes, parse_counts
+from shipshape.serving.encoding_npy import points_from_npy
+from shipshape.serving.encoding_pointcloud2 import Layout, parse_fields, points_from_pointcloud2
 from shipshape.serving.rest.schemas import (
     CapacityFields,
     ContactBody,
     ContactFields,
     OptionsFields,
+    PointCloud2Fields,
     QueryFields,
     RecogniseBody,
     ScanBody,
+    ScanQueryFields,
+    SensorFields,
 )
-from shipshape.serving.timing import LONGEST_MS
 from shipshape.types import Contact, Options
 
 JSON = "application/json"
 PACKED = "application/octet-stream"
-TIMEOUT_HEADER = "Shipshape-Timeout-Ms"
+NPY = "application/x-npy"
+POINTCLOUD2 = "application/vnd.shipshape.pointcloud2"
 M = TypeVar("M", bound=BaseModel)
 
 
-def media_type(request: Request, *accepted: str) -> str:
-    """The body's media type, one of `accepted`; anything else is 415."""
-    given = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if given not in accepted:
-        raise HTTPException(415, f"expected a body of type {' or '.join(accepted)}, got {given or 'none'}")
-    return given
+@dataclass(frozen=True, slots=True)
+class ParsedScan:
+    """A scan as its body brought it."""
 
-
-def timeout_s(request: Request, default_ms: float) -> float:
-    """Seconds that the caller gives this request.
-
-    Raises:
-        InvalidInput: The header is no number of milliseconds above 0.
-    """
-    text = request.headers.get(TIMEOUT_HEADER)
-    try:
-        milliseconds = default_ms if text is None else float(text)
-    except ValueError:
-        milliseconds = -1.0
-    if not 0 < milliseconds <= LONGEST_MS:
-        raise InvalidInput(f"expected {TIMEOUT_HEADER} above 0 and up to {LONGEST_MS:.0f}, got {text!r:.40}")
-    return milliseconds / 1e3
+    count: int  # of contacts; what follows is decoded only where a scan may have so many
+    contact_ids: Sequence[str]
+    contacts: Sequence[Contact | InvalidInput]  # an error in the place of each that cannot be decoded
+    wishes: Wishes
 
 
 def parse_packed(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
@@ -71,27 +62,62 @@ def parse_capacity(query: Mapping[str, str]) -> CapacityFields:
     return _validated(CapacityFields, dict(query))
 
 
+def parse_npy(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
+    """One contact in a .npy file, everything else in the query."""
+    fields = _validated(QueryFields, dict(query))
+    return _contact(fields, points_from_npy(body, limits)), _wishes(fields)
+
+
+def parse_pointcloud2(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
+    """One contact in the data of a PointCloud2, its layout and everything else in the query."""
+    fields = _validated(PointCloud2Fields, dict(query))
+    return _contact(fields, points_from_pointcloud2(body, _layout(fields), limits)), _wishes(fields)
+
+
 def parse_json(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
     """One contact in JSON; a query would be overlooked, so there must be none."""
     fields = _validated(RecogniseBody, _json(body, query))
     return _with_points(fields, limits), _wishes(fields)
 
 
-def parse_scan(body: bytes, query: Mapping[str, str]) -> ScanBody:
-    """A scan in JSON, its contacts still as they came."""
-    return _validated(ScanBody, _json(body, query))
+def parse_packed_scan(body: bytes, query: Mapping[str, str], limits: Limits) -> ParsedScan:
+    """A scan of packed points; how many each contact has, and everything else, in the query."""
+    fields = _validated(ScanQueryFields, dict(query))
+    counts = parse_counts(fields.counts)
+    if len(counts) > limits.max_contacts:
+        return ParsedScan(len(counts), [], [], _wishes(fields))
+    contacts = [
+        points if isinstance(points, InvalidInput) else _contact(fields, points)
+        for points in contacts_from_bytes(body, counts, limits)
+    ]
+    return ParsedScan(len(counts), [""] * len(counts), contacts, _wishes(fields))
 
 
-def decode_scan(scan: ScanBody, limits: Limits) -> tuple[list[str], list[Contact | InvalidInput], Wishes]:
-    """The contacts of a scan with their ids, an error in the place of each that cannot be decoded."""
-    check_contacts(len(scan.contacts), limits)
+def parse_json_scan(body: bytes, query: Mapping[str, str], limits: Limits) -> ParsedScan:
+    """A scan in JSON; a query would be overlooked, so there must be none."""
+    scan = _validated(ScanBody, _json(body, query))
+    count = len(scan.contacts)
+    if count > limits.max_contacts:
+        return ParsedScan(count, [], [], _wishes(scan))
     contacts: list[Contact | InvalidInput] = []
     for raw in scan.contacts:
         try:
             contacts.append(_with_points(_validated(ContactBody, raw), limits))
         except InvalidInput as error:
             contacts.append(error)
-    return [_id_of(raw) for raw in scan.contacts], contacts, _wishes(scan)
+    return ParsedScan(count, [_id_of(raw) for raw in scan.contacts], contacts, _wishes(scan))
+
+
+CONTACT_FORMS: Mapping[str, Callable[[bytes, Mapping[str, str], Limits], tuple[Contact, Wishes]]] = {
+    JSON: parse_json,
+    PACKED: parse_packed,
+    NPY: parse_npy,
+    POINTCLOUD2: parse_pointcloud2,
+}
+SCAN_FORMS: Mapping[str, Callable[[bytes, Mapping[str, str], Limits], ParsedScan]] = {
+    JSON: parse_json_scan,
+    PACKED: parse_packed_scan,
+}
 
 
 def sentence(error: ValidationError) -> str:
@@ -131,12 +157,24 @@ def _with_points(fields: ContactBody, limits: Limits) -> Contact:
     return _contact(fields, points_from_rows(fields.points, limits))
 
 
-def _contact(fields: ContactFields, points_level: Any) -> Contact:
+def _contact(fields: SensorFields, points_level: Any) -> Contact:
     return make_contact(
         points_level,
-        contact_id=fields.contact_id,
+        contact_id=fields.contact_id if isinstance(fields, ContactFields) else "",
         sensor_height_m=fields.sensor_height_m,
         own_true_heading_deg=fields.own_true_heading_deg,
+    )
+
+
+def _layout(fields: PointCloud2Fields) -> Layout:
+    return Layout(
+        parse_fields(fields.fields),
+        fields.width,
+        fields.height,
+        fields.point_step,
+        fields.width * fields.point_step if fields.row_step is None else fields.row_step,
+        fields.is_bigendian,
+        fields.is_dense,
     )
 
 

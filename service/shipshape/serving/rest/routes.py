@@ -1,6 +1,6 @@
 """The handlers of the REST door: translate, delegate to the core, translate back."""
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import TypeVar
 
 from fastapi import HTTPException, Request, Response
@@ -11,23 +11,15 @@ from shipshape.errors import NotReady
 from shipshape.executor import Lane, Ticket
 from shipshape.serving.clients import Clients, Share
 from shipshape.serving.core import Answer, Core, Scan, conclude, outcome_of
-from shipshape.serving.encoding import Wishes
+from shipshape.serving.encoding import Wishes, check_contacts
 from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.rest import answers
 from shipshape.serving.rest.bodies import Bodies
+from shipshape.serving.rest.headers import media_type, timeout_s
+from shipshape.serving.rest.json_process import JsonProcess, Parse
 from shipshape.serving.rest.problems import ID_HEADER, identify, problem
-from shipshape.serving.rest.requests import (
-    JSON,
-    PACKED,
-    decode_scan,
-    media_type,
-    parse_capacity,
-    parse_json,
-    parse_packed,
-    parse_scan,
-    timeout_s,
-)
+from shipshape.serving.rest.requests import CONTACT_FORMS, JSON, SCAN_FORMS, parse_capacity
 from shipshape.serving.rest.waiting import until_settled
 from shipshape.serving.timing import Timeouts, server_timing
 from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
@@ -35,21 +27,33 @@ from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
 Handler = Callable[[Request, Outcome, Share], Awaitable[Response]]
 T = TypeVar("T")
 SMALL_BYTES = 64 * 2**10  # of a body: JSON of this size is parsed in under a millisecond
+LARGE_JSON_BYTES = 256 * 2**10  # some 4,000 points: no thread holds the loop up for more than 3 ms over it
 SMALL_SCAN = 32  # contacts: written in under a millisecond
 
 
 class Routes:
-    """One method a path. Large bodies are parsed and written off the event loop."""
+    """One method a path. Large bodies are parsed and written off the event loop.
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, clients: Clients) -> None:
+    Args:
+        core: Answers.
+        metrics: Told of every request.
+        timeouts: Deadline of requests that set none.
+        clients: Hold each to its share.
+        json: Parses large JSON.
+    """
+
+    def __init__(
+        self, core: Core, metrics: Metrics, timeouts: Timeouts, clients: Clients, json: JsonProcess
+    ) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
         self._clients = clients
         self._bodies = Bodies(core.limits)
+        self._json = json
 
     async def recognise(self, request: Request) -> Response:
-        """One contact: JSON, or packed points with everything else in the query."""
+        """One contact: JSON, or its points in a binary form with everything else in the query."""
         return await self._guarded(request, SINGLE, self._recognise)
 
     async def scan(self, request: Request) -> Response:
@@ -100,12 +104,13 @@ class Routes:
     async def _recognise(self, request: Request, outcome: Outcome, share: Share) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
         share.take(1)
-        parse = parse_packed if media_type(request, JSON, PACKED) == PACKED else parse_json
+        form = media_type(request, *CONTACT_FORMS)
         deadline = self._core.deadline_in(seconds)
         async with self._bodies.read(request, seconds) as body:
+            parse = await self._parser(form, CONTACT_FORMS[form], body, request.query_params, deadline)
 
             def submit() -> tuple[Ticket[Answer], Wishes]:
-                contact, wishes = parse(body, request.query_params, self._core.limits)
+                contact, wishes = parse()
                 return self._core.submit(model, contact, wishes, deadline), wishes
 
             ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
@@ -117,22 +122,33 @@ class Routes:
 
     async def _scan(self, request: Request, outcome: Outcome, share: Share) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
-        media_type(request, JSON)
+        form = media_type(request, *SCAN_FORMS)
         deadline = self._core.deadline_in(seconds)
         async with self._bodies.read(request, seconds) as body:
+            parse = await self._parser(form, SCAN_FORMS[form], body, request.query_params, deadline)
 
-            def submit() -> tuple[list[str], Scan, Wishes]:
-                parsed = parse_scan(body, request.query_params)
-                outcome.contacts = len(parsed.contacts)
-                share.take(min(outcome.contacts, self._core.limits.max_contacts))
-                ids, contacts, wishes = decode_scan(parsed, self._core.limits)
-                return ids, self._core.submit_scan(model, contacts, wishes, deadline), wishes
+            def submit() -> tuple[Sequence[str], Scan, Wishes]:
+                parsed = parse()
+                outcome.contacts = parsed.count
+                check_contacts(parsed.count, self._core.limits)
+                share.take(parsed.count)
+                scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, deadline)
+                return parsed.contact_ids, scan, parsed.wishes
 
             ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         outcome.urgent = wishes.lane is not Lane.BATCH
         await until_settled(scan.tickets, request)
         small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
         return await _run(lambda: self._many(ids, scan, wishes), small=small)
+
+    async def _parser(
+        self, form: str, parse: Parse[T], body: bytes, query: Mapping[str, str], deadline: float
+    ) -> Callable[[], T]:
+        """Gives the parsed body: large JSON is parsed before, in another process, all else when it is called."""
+        if form == JSON and len(body) > LARGE_JSON_BYTES:
+            parsed = await self._json.parse(parse, body, query, self._core.seconds_until(deadline))
+            return lambda: parsed
+        return lambda: parse(body, query, self._core.limits)
 
     async def _model(self, _request: Request, _: Outcome, _share: Share) -> Response:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
@@ -143,7 +159,7 @@ class Routes:
         capacity = self._core.capacity(asked.points, asked.lane)
         return _json(answers.to_bytes(answers.from_capacity(capacity, self._metrics.budget.report())))
 
-    def _many(self, ids: list[str], scan: Scan, wishes: Wishes) -> Response:
+    def _many(self, ids: Sequence[str], scan: Scan, wishes: Wishes) -> Response:
         outcomes, stage_ms = conclude(scan, "rest", self._metrics)
         return self._timed(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), stage_ms)
 

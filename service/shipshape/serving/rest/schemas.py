@@ -63,16 +63,21 @@ class CapacityFields(_Asked):
     lane: Lane = Field(Lane.TRACKING, description="What it is for.")
 
 
-class ContactFields(_Asked):
-    """What the caller knows of a contact beside its points."""
+class SensorFields(_Asked):
+    """What the caller knows of its own LiDAR and vessel."""
 
-    contact_id: str = Field("", description="The caller's name for it, returned; at most 256 characters.")
     sensor_height_m: float | None = Field(
         None, description="LiDAR above the water, metres; absent: the lowest point stands in for the water."
     )
     own_true_heading_deg: float | None = Field(
         None, description="The caller's own heading, degrees clockwise from true north."
     )
+
+
+class ContactFields(SensorFields):
+    """What the caller knows of a contact beside its points."""
+
+    contact_id: str = Field("", description="The caller's name for it, returned; at most 256 characters.")
 
 
 class ContactBody(ContactFields):
@@ -93,7 +98,31 @@ class RecogniseBody(ContactBody, OptionsFields):
 
 
 class QueryFields(ContactFields, OptionsFields):
-    """What goes beside a body of packed points."""
+    """What goes beside a body of one contact's points."""
+
+
+Uint32 = Annotated[int, Field(ge=0, lt=2**32)]
+
+
+class PointCloud2Fields(QueryFields):
+    """What goes beside the data of a sensor_msgs/PointCloud2: the other members of that message."""
+
+    fields: str = Field(
+        description="name:offset:datatype or name:offset:datatype:count, separated by commas, as in "
+        "x:0:7,y:4:7,z:8:7,intensity:16:7. x, y and z are float32 (7) or float64 (8); others are ignored."
+    )
+    width: Uint32 = Field(description="Points a row.")
+    height: Uint32 = Field(1, description="Rows.")
+    point_step: Uint32 = Field(description="Bytes from point to point.")
+    row_step: Uint32 | None = Field(None, description="Bytes from row to row; absent: width x point_step.")
+    is_bigendian: bool = Field(False, description="Byte order of the numbers.")
+    is_dense: bool = Field(True, description="False: points that are not finite are dropped, not refused.")
+
+
+class ScanQueryFields(SensorFields, OptionsFields):
+    """What goes beside the packed points of a scan, one contact after the other; holds for all of them."""
+
+    counts: str = Field(description="Points of each contact, separated by commas, as in 40,12,300.")
 
 
 class ScanBody(OptionsFields):

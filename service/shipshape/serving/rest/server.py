@@ -51,7 +51,7 @@ class RestDoor:
             h11_max_incomplete_event_size=HEADER_BYTES,
             timeout_keep_alive=KEEP_ALIVE_S,
             ws="none",
-            lifespan="off",
+            lifespan="on",
             server_header=False,
             proxy_headers=False,  # a caller could name any address as its own
             ssl_context_factory=None if self._tls is None else partial(_context, self._tls),
