@@ -20,6 +20,7 @@ COMMANDS = {
     "modelnet": ("shipshape_lab.experiments.modelnet", "the paper's Experiment 1, on ModelNet40 shapes"),
     "experiment2": ("shipshape_lab.experiments.experiment_2", "the paper's Experiment 2, trained both ways"),
     "ablation": ("shipshape_lab.experiments.ablation", "accuracy over r and d_min"),
+    "ladder": ("shipshape_lab.experiments.ladder", "what the answers given when time is short are worth"),
     "reasons": ("shipshape_lab.experiments.reasons", "what reason codes and the heading's spread are worth"),
     "restore-ms": ("shipshape_lab.experiments.restore_ms", "milliseconds beside PCN and SnowflakeNet"),
     "real": ("shipshape_lab.experiments.real_hulls", "what a bundle says of real hulls from mesh files"),

@@ -27,6 +27,7 @@ ORDER = (
     "recognition_h",
     "recognition_u",
     "reasons",
+    "ladder",
     "heading_peers",
     "restoration_p",
     "restoration_h",

@@ -18,6 +18,7 @@ class _Line:
         self.variance = self.covariance = 0.0
 
     def learn(self, size: float, seconds: float) -> None:
+        """One more observation."""
         self.seen += 1
         weight = max(1.0 / self.seen, 2.0 / MEMORY)  # the first ones count alike, so that it is soon right
         off_size, off_seconds = size - self.size, seconds - self.seconds
@@ -27,6 +28,7 @@ class _Line:
         self.covariance = (1.0 - weight) * (self.covariance + weight * off_size * off_seconds)
 
     def at(self, size: float) -> float:
+        """Seconds expected at this size, never less for more."""
         slope = max(0.0, self.covariance / self.variance) if self.variance > _NO_SPREAD else 0.0
         return max(0.0, self.seconds + slope * (size - self.size))
 
