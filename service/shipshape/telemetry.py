@@ -11,14 +11,20 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector
 
-# Seconds. Stages lie between 10 us and the budget; answers around the budget of 50 ms.
+from shipshape.budget import WINDOWS, Budget, Level
+
+# Seconds, but those of requests: shares of the budget.
 STAGE_BUCKETS = (5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3, 25e-3, 50e-3, 0.1, 0.4, 1.6)
-REQUEST_BUCKETS = (1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 25e-3, 35e-3, 50e-3, 70e-3, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+REQUEST_BUCKETS = (0.02, 0.04, 0.08, 0.16, 0.32, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 4.0, 10.0, 20.0, 100.0)
 AGE_BUCKETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 60.0)
 OK, DEGRADED, CANCELLED, INTERNAL = "ok", "degraded", "cancelled", "internal"
+# What the budget is held to: answers, and what only we are to blame for.
+HELD = (OK, DEGRADED, INTERNAL, "overloaded", "deadline_exceeded", "not_ready")
 SINGLE, SCAN = "recognise", "recognise_scan"  # the methods whose request is one contact, and many
 
 request_id: ContextVar[str] = ContextVar("request_id", default="")
@@ -39,13 +45,20 @@ class Outcome:
 
     kind: str = OK
     contacts: int = 0  # that the request brought, as soon as it is known
+    urgent: bool = True  # held to the budget, which work of the batch lane is not
 
 
 class Metrics:
-    """All metrics of the service, registered in the registry handed in."""
+    """All metrics of the service, registered in the registry handed in.
 
-    def __init__(self, registry: CollectorRegistry) -> None:
+    Args:
+        registry: Holds them.
+        budget: Told of every answer; the buckets of request times lie around it.
+    """
+
+    def __init__(self, registry: CollectorRegistry, budget: Budget) -> None:
         self.registry = registry
+        self.budget = budget
         self._stage = Histogram(
             "shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS, registry=registry
         )
@@ -53,7 +66,7 @@ class Metrics:
             "shipshape_request_seconds",
             "Time of one request at the door, whatever the outcome.",
             ["door", "method", "outcome"],
-            buckets=REQUEST_BUCKETS,
+            buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
             registry=registry,
         )
         self._wait = Histogram(
@@ -73,14 +86,14 @@ class Metrics:
             "shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"], registry=registry
         )
         self._in_flight = Gauge("shipshape_in_flight", "Requests under way.", ["door"], registry=registry)
-        self._queue = Gauge("shipshape_queue_depth", "Contacts that wait for a worker.", registry=registry)
-        self._queue_age = Gauge(
-            "shipshape_queue_age_seconds",
-            "How long the contact has waited that has waited longest.",
+        self._ready = Gauge("shipshape_ready", "1 while the service takes requests.", registry=registry)
+        self._held = Counter(
+            "shipshape_budget",
+            "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
+            ["inside"],
             registry=registry,
         )
-        self._running = Gauge("shipshape_running", "Contacts being computed.", registry=registry)
-        self._ready = Gauge("shipshape_ready", "1 while the service takes requests.", registry=registry)
+        watch_budget(budget, registry)
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
         ProcessCollector(registry=registry)
 
@@ -100,14 +113,6 @@ class Metrics:
     def observe_age(self, seconds: float) -> None:
         """The points of a request were this old; seconds."""
         self._age.observe(seconds)
-
-    def watch_queue(
-        self, depth: Callable[[], float], age: Callable[[], float], running: Callable[[], float]
-    ) -> None:
-        """Read the gauges from the executor whenever somebody scrapes."""
-        self._queue.set_function(depth)
-        self._queue_age.set_function(age)
-        self._running.set_function(running)
 
     def set_ready(self, ready: bool) -> None:
         """Whether the service takes requests."""
@@ -140,7 +145,66 @@ class Metrics:
             self._request.labels(door, method, outcome.kind).observe(seconds)
             if method == SINGLE or outcome.kind not in (OK, DEGRADED):
                 self.count_contacts(door, [outcome.kind] * outcome.contacts)
+            if method in (SINGLE, SCAN) and outcome.urgent and outcome.kind in HELD:
+                inside = self.budget.tell(seconds, answered=outcome.kind in (OK, DEGRADED))
+                self._held.labels(str(inside).lower()).inc()
             _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
+
+
+class Workers(Protocol):
+    """What gauges are read from whenever somebody scrapes."""
+
+    @property
+    def workers(self) -> int:
+        """Threads that compute."""
+        ...
+
+    @property
+    def running(self) -> int:
+        """Contacts being computed."""
+        ...
+
+    @property
+    def queue_depth(self) -> int:
+        """Contacts that wait."""
+        ...
+
+    @property
+    def queue_age(self) -> float:
+        """Seconds that the oldest of them has waited."""
+        ...
+
+
+def watch_workers(workers: Workers, registry: CollectorRegistry) -> None:
+    """Gauges of the workers and their queue."""
+    gauges: dict[str, tuple[str, Callable[[], float]]] = {
+        "shipshape_workers": ("Threads that compute.", lambda: workers.workers),
+        "shipshape_running": ("Contacts being computed.", lambda: workers.running),
+        "shipshape_queue_depth": ("Contacts that wait for a worker.", lambda: workers.queue_depth),
+        "shipshape_queue_age_seconds": ("How long the oldest of them has waited.", lambda: workers.queue_age),
+    }
+    for name, (text, read) in gauges.items():
+        Gauge(name, text, registry=registry).set_function(read)
+
+
+def watch_budget(budget: Budget, registry: CollectorRegistry) -> None:
+    """Gauges of the budget, read whenever somebody scrapes."""
+    size = Gauge("shipshape_budget_seconds", "Time that an answer may take.", registry=registry)
+    size.set(budget.budget_s)
+    level = Gauge("shipshape_budget_level", "0 held, 1 warning, 2 error.", registry=registry)
+    level.set_function(lambda: list(Level).index(budget.report().level))
+    burn = Gauge(
+        "shipshape_error_budget_burn",
+        "How fast the share of answers that may be bad is used up; 1 is as fast as allowed.",
+        ["window"],
+        registry=registry,
+    )
+    for window in WINDOWS:
+        burn.labels(window).set_function(partial(_burn, budget, window))
+
+
+def _burn(budget: Budget, window: str) -> float:
+    return budget.report().burn[window]
 
 
 class JsonLines(logging.Formatter):

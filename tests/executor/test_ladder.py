@@ -171,6 +171,6 @@ def test_a_cost_that_was_once_dear_is_learned_again(executor, clock):
 
 
 def test_what_is_expected_can_be_asked(executor, ticking):
-    assert executor.expect(ticking.ladder[0], 0) == pytest.approx(6)
-    assert executor.expect(ticking.ladder[2], 0) == pytest.approx(1)
+    assert executor.promise(ticking.ladder[0], 0, Lane.BATCH) == pytest.approx(6 * HEADROOM)
+    assert executor.promise(ticking.ladder[2], 0, Lane.BATCH) == pytest.approx(HEADROOM)
     assert executor.wait(Lane.BATCH) == 0

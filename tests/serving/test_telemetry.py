@@ -6,6 +6,7 @@ import sys
 import pytest
 from prometheus_client import CollectorRegistry
 
+from shipshape.budget import Budget
 from shipshape.telemetry import JsonLines, Metrics, new_request_id, request_id
 
 
@@ -40,7 +41,7 @@ def test_an_id_that_could_harm_a_log_is_replaced(proposed):
 
 
 def test_a_request_is_timed_though_it_fails():
-    metrics = Metrics(CollectorRegistry())
+    metrics = Metrics(CollectorRegistry(), Budget(0.05))
 
     def fail():
         with metrics.request("rest", "recognise") as outcome:
@@ -56,7 +57,7 @@ def test_a_request_is_timed_though_it_fails():
 
 @pytest.mark.parametrize(("error", "kind"), [(asyncio.CancelledError, "cancelled"), (MemoryError, "internal")])
 def test_a_request_that_was_broken_off_is_not_ok(error, kind):
-    metrics = Metrics(CollectorRegistry())
+    metrics = Metrics(CollectorRegistry(), Budget(0.05))
     with pytest.raises(error), metrics.request("rest", "recognise"):
         raise error
     labels = {"door": "rest", "method": "recognise", "outcome": kind}
@@ -65,7 +66,7 @@ def test_a_request_that_was_broken_off_is_not_ok(error, kind):
 
 
 def test_two_services_in_one_process_do_not_share_metrics():
-    first, second = Metrics(CollectorRegistry()), Metrics(CollectorRegistry())
+    first, second = Metrics(CollectorRegistry(), Budget(0.05)), Metrics(CollectorRegistry(), Budget(0.05))
     first.observe_stage("prior", 0.01)
     labels = {"stage": "prior"}
     assert first.registry.get_sample_value("shipshape_stage_seconds_count", labels) == 1

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from shipshape.errors import NotReady, Overloaded
-from shipshape.executor.admission import settle_rungs
+from shipshape.executor.admission import HEADROOM, settle_rungs
 from shipshape.executor.costs import Costs
 from shipshape.executor.counts import Counts, outcome_of
 from shipshape.executor.deadlines import Deadlines
@@ -115,10 +115,10 @@ class Executor:
         with self._lock:
             return self._counts
 
-    def expect(self, rung: Rung[Any], size: float) -> float:
-        """Seconds that work of this size will probably take on this rung, once a worker has taken it."""
+    def promise(self, rung: Rung[Any], size: float, lane: Lane) -> float:
+        """Seconds in which new work of this size and lane would be answered on this rung, as admission sees it."""
         with self._lock:
-            return sum(self._costs.each([*rung.stages, rung], size))
+            return HEADROOM * (self._wait(lane) + sum(self._costs.each([*rung.stages, rung], size)))
 
     def wait(self, lane: Lane) -> float:
         """Seconds until a worker will probably be free for new work of this lane."""

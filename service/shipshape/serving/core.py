@@ -11,7 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from shipshape.bundle import Bundle
 from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
-from shipshape.executor import Ended, Executor, Stage, Task, Ticket
+from shipshape.executor import Ended, Executor, Lane, Stage, Task, Ticket
 from shipshape.serving.age import age_of, time_left
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
@@ -73,6 +73,17 @@ class Answer:
     contact: Contact
     recognition: Recognition
     png: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Capacity:
+    """What the service would promise now; seconds."""
+
+    promises: Mapping[Rung, float]  # in which a contact would be answered on each rung
+    wait_s: float  # of that, until a worker is free
+    queue_depth: int
+    running: int
+    workers: int
 
 
 class Scan:
@@ -180,6 +191,25 @@ class Core:
         if (model := self._model) is None:
             raise NotReady(self._refusal)
         return model
+
+    def capacity(self, points: int, lane: Lane) -> Capacity:
+        """What would be promised now to a contact of so many points in this lane.
+
+        Raises:
+            NotReady: The service is starting or stopping.
+        """
+        ladder = self.model().pipeline.ladder(Options())
+        return Capacity(
+            {rung.name: self._executor.promise(rung, points, lane) for rung in ladder},
+            self._executor.wait(lane),
+            self._executor.queue_depth,
+            self._executor.running,
+            self._executor.workers,
+        )
+
+    def load(self) -> float:
+        """Contacts that wait or are computed, a worker: over 1, there is a queue."""
+        return (self._executor.queue_depth + self._executor.running) / self._executor.workers
 
     def submit(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Ticket[Answer]:
         """Queue one contact; a ticket for its answer.

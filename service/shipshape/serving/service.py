@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import cv2
 from prometheus_client import CollectorRegistry
 
+from shipshape.budget import Budget
 from shipshape.errors import Cancelled
 from shipshape.executor import Executor, usable_cores
 from shipshape.sample import sample_contact
@@ -23,7 +24,7 @@ from shipshape.serving.rest.server import RestDoor
 from shipshape.serving.timing import Timeouts
 from shipshape.serving.warmup import warm_up
 from shipshape.settings import Settings
-from shipshape.telemetry import Metrics
+from shipshape.telemetry import Metrics, watch_workers
 
 LAST_WORDS_S = 0.5  # to write the answers that the drained work gave
 
@@ -62,16 +63,14 @@ class Service:
         self._turn = threading.Lock()  # to ready, or to stopping
         self._stopping = False
         self._render = render
-        self._metrics = Metrics(CollectorRegistry())
+        self._metrics = Metrics(CollectorRegistry(), Budget(settings.budget_ms / 1e3))
         self.executor = Executor(
             workers,
             settings.queue_limit,
             on_stage=self._metrics.observe_stage,
             on_wait=self._metrics.observe_wait,
         )
-        self._metrics.watch_queue(
-            lambda: self.executor.queue_depth, lambda: self.executor.queue_age, lambda: self.executor.running
-        )
+        watch_workers(self.executor, self._metrics.registry)
         self._core = Core(self.executor, limits, render, on_age=self._metrics.observe_age)
         self._grpc = GrpcDoor(self._core, self._metrics, timeouts, waiting=settings.queue_limit + workers)
         self._rest = RestDoor(build_app(self._core, self._metrics, timeouts), on_death=on_death)

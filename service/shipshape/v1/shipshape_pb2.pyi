@@ -341,3 +341,58 @@ class Limits(_message.Message):
     default_timeout_ms: float
     budget_ms: float
     def __init__(self, max_body_bytes: _Optional[int] = ..., max_points: _Optional[int] = ..., max_contacts: _Optional[int] = ..., default_timeout_ms: _Optional[float] = ..., budget_ms: _Optional[float] = ...) -> None: ...
+
+class GetCapacityRequest(_message.Message):
+    __slots__ = ("points", "lane")
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    LANE_FIELD_NUMBER: _ClassVar[int]
+    points: int
+    lane: Lane
+    def __init__(self, points: _Optional[int] = ..., lane: _Optional[_Union[Lane, str]] = ...) -> None: ...
+
+class GetCapacityResponse(_message.Message):
+    __slots__ = ("promises", "wait_ms", "queue_depth", "running", "workers", "budget")
+    PROMISES_FIELD_NUMBER: _ClassVar[int]
+    WAIT_MS_FIELD_NUMBER: _ClassVar[int]
+    QUEUE_DEPTH_FIELD_NUMBER: _ClassVar[int]
+    RUNNING_FIELD_NUMBER: _ClassVar[int]
+    WORKERS_FIELD_NUMBER: _ClassVar[int]
+    BUDGET_FIELD_NUMBER: _ClassVar[int]
+    promises: _containers.RepeatedCompositeFieldContainer[Promise]
+    wait_ms: float
+    queue_depth: int
+    running: int
+    workers: int
+    budget: Budget
+    def __init__(self, promises: _Optional[_Iterable[_Union[Promise, _Mapping]]] = ..., wait_ms: _Optional[float] = ..., queue_depth: _Optional[int] = ..., running: _Optional[int] = ..., workers: _Optional[int] = ..., budget: _Optional[_Union[Budget, _Mapping]] = ...) -> None: ...
+
+class Promise(_message.Message):
+    __slots__ = ("rung", "milliseconds")
+    RUNG_FIELD_NUMBER: _ClassVar[int]
+    MILLISECONDS_FIELD_NUMBER: _ClassVar[int]
+    rung: str
+    milliseconds: float
+    def __init__(self, rung: _Optional[str] = ..., milliseconds: _Optional[float] = ...) -> None: ...
+
+class Budget(_message.Message):
+    __slots__ = ("level", "budget_ms", "good", "bad", "last_good_s", "burn")
+    class BurnEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: float
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[float] = ...) -> None: ...
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    BUDGET_MS_FIELD_NUMBER: _ClassVar[int]
+    GOOD_FIELD_NUMBER: _ClassVar[int]
+    BAD_FIELD_NUMBER: _ClassVar[int]
+    LAST_GOOD_S_FIELD_NUMBER: _ClassVar[int]
+    BURN_FIELD_NUMBER: _ClassVar[int]
+    level: str
+    budget_ms: float
+    good: int
+    bad: int
+    last_good_s: float
+    burn: _containers.ScalarMap[str, float]
+    def __init__(self, level: _Optional[str] = ..., budget_ms: _Optional[float] = ..., good: _Optional[int] = ..., bad: _Optional[int] = ..., last_good_s: _Optional[float] = ..., burn: _Optional[_Mapping[str, float]] = ...) -> None: ...

@@ -49,6 +49,11 @@ class ShipshapeStub:
                 request_serializer=shipshape_dot_v1_dot_shipshape__pb2.GetModelInfoRequest.SerializeToString,
                 response_deserializer=shipshape_dot_v1_dot_shipshape__pb2.GetModelInfoResponse.FromString,
                 _registered_method=True)
+        self.GetCapacity = channel.unary_unary(
+                '/shipshape.v1.Shipshape/GetCapacity',
+                request_serializer=shipshape_dot_v1_dot_shipshape__pb2.GetCapacityRequest.SerializeToString,
+                response_deserializer=shipshape_dot_v1_dot_shipshape__pb2.GetCapacityResponse.FromString,
+                _registered_method=True)
 
 
 class ShipshapeServicer:
@@ -75,6 +80,13 @@ class ShipshapeServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetCapacity(self, request, context):
+        """What this service would promise now, and how its latency budget is doing: to choose between services.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_ShipshapeServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -92,6 +104,11 @@ def add_ShipshapeServicer_to_server(servicer, server):
                     servicer.GetModelInfo,
                     request_deserializer=shipshape_dot_v1_dot_shipshape__pb2.GetModelInfoRequest.FromString,
                     response_serializer=shipshape_dot_v1_dot_shipshape__pb2.GetModelInfoResponse.SerializeToString,
+            ),
+            'GetCapacity': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetCapacity,
+                    request_deserializer=shipshape_dot_v1_dot_shipshape__pb2.GetCapacityRequest.FromString,
+                    response_serializer=shipshape_dot_v1_dot_shipshape__pb2.GetCapacityResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -175,6 +192,33 @@ class Shipshape:
             '/shipshape.v1.Shipshape/GetModelInfo',
             shipshape_dot_v1_dot_shipshape__pb2.GetModelInfoRequest.SerializeToString,
             shipshape_dot_v1_dot_shipshape__pb2.GetModelInfoResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetCapacity(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/shipshape.v1.Shipshape/GetCapacity',
+            shipshape_dot_v1_dot_shipshape__pb2.GetCapacityRequest.SerializeToString,
+            shipshape_dot_v1_dot_shipshape__pb2.GetCapacityResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -7,9 +7,10 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import UInt8
 
+from shipshape.budget import Report
 from shipshape.errors import InvalidInput
 from shipshape.executor import Lane
-from shipshape.serving.core import Answer, Model
+from shipshape.serving.core import Answer, Capacity, Model
 from shipshape.serving.encoding import (
     Limits,
     Wishes,
@@ -79,7 +80,7 @@ def to_wishes(message: pb.Options) -> Wishes:
     )
     return make_wishes(
         options=options,
-        lane=_numbered(LANES, message.lane, "lane", Lane.TRACKING),
+        lane=to_lane(message.lane),
         captured_at=message.captured_at if message.HasField("captured_at") else None,
         max_age_ms=message.max_age_ms if message.HasField("max_age_ms") else None,
         bundle=message.bundle,
@@ -153,6 +154,32 @@ def from_model(model: Model, version: str) -> pb.GetModelInfoResponse:
         scores=flat_scores(model.bundle.scores),
         stages=[stage.name for stage in model.pipeline.stages],
     )
+
+
+def from_capacity(capacity: Capacity, budget: Report) -> pb.GetCapacityResponse:
+    """The message of what would be promised."""
+    return pb.GetCapacityResponse(
+        promises=[
+            pb.Promise(rung=rung, milliseconds=seconds * 1e3) for rung, seconds in capacity.promises.items()
+        ],
+        wait_ms=capacity.wait_s * 1e3,
+        queue_depth=capacity.queue_depth,
+        running=capacity.running,
+        workers=capacity.workers,
+        budget=pb.Budget(
+            level=budget.level,
+            budget_ms=budget.budget_s * 1e3,
+            good=budget.good,
+            bad=budget.bad,
+            last_good_s=budget.last_good_s,
+            burn=budget.burn,
+        ),
+    )
+
+
+def to_lane(number: int) -> Lane:
+    """The lane of its number; raises InvalidInput for one that the contract does not know."""
+    return _numbered(LANES, number, "lane", Lane.TRACKING)
 
 
 def _box(box: Box) -> pb.Box:

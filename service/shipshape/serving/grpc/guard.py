@@ -12,6 +12,7 @@ from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.telemetry import DEGRADED, SCAN, SINGLE, Metrics, new_request_id, request_id
 from shipshape.types import Rung
+from shipshape.v1 import shipshape_pb2 as pb
 
 STATUS = {
     FaultKind.INVALID_INPUT: grpc.StatusCode.INVALID_ARGUMENT,
@@ -23,7 +24,7 @@ STATUS = {
     FaultKind.NOT_READY: grpc.StatusCode.UNAVAILABLE,
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
-METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info"}
+METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info", "GetCapacity": "capacity"}
 PREFIX = "/shipshape.v1.Shipshape/"
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
 
@@ -56,6 +57,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     message = _parsed(raw, parse)
                     if method == SCAN:
                         outcome.contacts = len(message.contacts)
+                    outcome.urgent = method not in (SINGLE, SCAN) or message.options.lane != pb.LANE_BATCH
                     response = behaviour(message, context)
                 except Exception as error:
                     fault = fault_of(error)
@@ -69,7 +71,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         return call
 
 
-def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str]) -> None:
+def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str | bytes]) -> None:
     """Trailing metadata: `entries` and the request's id."""
     context.set_trailing_metadata((*entries, ("x-request-id", request_id.get())))
 

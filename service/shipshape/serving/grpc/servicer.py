@@ -11,11 +11,13 @@ from shipshape.serving.core import Core, conclude
 from shipshape.serving.encoding import check_contacts
 from shipshape.serving.grpc import convert
 from shipshape.serving.grpc.guard import set_trailing
+from shipshape.serving.load_report import GRPC_TRAILER, as_message
 from shipshape.serving.timing import LONGEST_MS, Timeouts, server_timing
 from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.v1 import shipshape_pb2_grpc as pb_grpc
 
+USUAL_POINTS = 300  # of a contact, when nothing else is said
 NEVER_S = 365 * 86400.0  # gRPC hands out centuries when the caller set no deadline
 
 
@@ -35,7 +37,7 @@ class Servicer(pb_grpc.ShipshapeServicer):
         ticket = self._core.submit(model, contact, wishes, self._deadline(context))
         _cancel_with(context, [ticket])
         answer = ticket.result()
-        _set_timing(context, answer.recognition.stage_ms)
+        _set_timing(context, answer.recognition.stage_ms, self._core.load())
         return pb.RecogniseResponse(recognition=convert.from_answer(answer, wishes))
 
     def RecogniseScan(
@@ -49,7 +51,7 @@ class Servicer(pb_grpc.ShipshapeServicer):
         scan = self._core.submit_scan(model, contacts, wishes, self._deadline(context))
         _cancel_with(context, scan.tickets)
         outcomes, stage_ms = conclude(scan, "grpc", self._metrics)
-        _set_timing(context, stage_ms)
+        _set_timing(context, stage_ms, self._core.load())
         return convert.from_outcomes((contact.contact_id for contact in request.contacts), outcomes, wishes)
 
     def GetModelInfo(
@@ -65,6 +67,12 @@ class Servicer(pb_grpc.ShipshapeServicer):
         info.limits.budget_ms = self._timeouts.budget_ms
         set_trailing(context)
         return info
+
+    def GetCapacity(self, request: pb.GetCapacityRequest, context: grpc.ServicerContext) -> pb.GetCapacityResponse:
+        """What would be promised now, and how the budget is doing."""
+        capacity = self._core.capacity(request.points or USUAL_POINTS, convert.to_lane(request.lane))
+        set_trailing(context)
+        return convert.from_capacity(capacity, self._metrics.budget.report())
 
     def _deadline(self, context: grpc.ServicerContext) -> float:
         remaining = context.time_remaining()
@@ -84,5 +92,5 @@ def _cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) 
         cancel()
 
 
-def _set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float]) -> None:
-    set_trailing(context, ("server-timing", server_timing(stage_ms)))
+def _set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float], load: float) -> None:
+    set_trailing(context, ("server-timing", server_timing(stage_ms)), (GRPC_TRAILER, as_message(load)))

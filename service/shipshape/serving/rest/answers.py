@@ -10,7 +10,8 @@ import numpy as np
 import orjson
 from jaxtyping import UInt8
 
-from shipshape.serving.core import Answer, Model
+from shipshape.budget import Report
+from shipshape.serving.core import Answer, Capacity, Model
 from shipshape.serving.encoding import Limits, Wishes, flat_scores
 from shipshape.serving.faults import Fault
 from shipshape.serving.timing import Timeouts
@@ -89,6 +90,25 @@ def from_model(model: Model, limits: Limits, timeouts: Timeouts) -> Json:
             "max_contacts": limits.max_contacts,
             "default_timeout_ms": timeouts.default_ms,
             "budget_ms": timeouts.budget_ms,
+        },
+    }
+
+
+def from_capacity(capacity: Capacity, budget: Report) -> Json:
+    """A `CapacityAnswer`."""
+    return {
+        "promises": [{"rung": rung, "milliseconds": seconds * 1e3} for rung, seconds in capacity.promises.items()],
+        "wait_ms": capacity.wait_s * 1e3,
+        "queue_depth": capacity.queue_depth,
+        "running": capacity.running,
+        "workers": capacity.workers,
+        "budget": {
+            "level": budget.level,
+            "budget_ms": budget.budget_s * 1e3,
+            "good": budget.good,
+            "bad": budget.bad,
+            "last_good_s": budget.last_good_s,
+            "burn": budget.burn,
         },
     }
 

@@ -11,7 +11,7 @@ from shipshape.serving.faults import FaultKind
 from shipshape.serving.rest import contract
 from shipshape.serving.rest.problems import add_handlers
 from shipshape.serving.rest.routes import Routes
-from shipshape.serving.rest.schemas import ModelAnswer, RecognitionAnswer, ScanAnswer
+from shipshape.serving.rest.schemas import CapacityAnswer, ModelAnswer, RecognitionAnswer, ScanAnswer
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
 
@@ -39,6 +39,7 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts) -> FastAPI:
     add("/v1/recognise", routes.recognise, "POST", **_api(RecognitionAnswer, refusals, contract.recognise_extra()))
     add("/v1/scan", routes.scan, "POST", **_api(ScanAnswer, refusals, contract.scan_extra()))
     add("/v1/model", routes.model, "GET", **_api(ModelAnswer, not_ready, None))
+    add("/v1/capacity", routes.capacity, "GET", **_api(CapacityAnswer, not_ready, contract.capacity_extra()))
     add("/livez", routes.live, "GET")
     add("/readyz", routes.ready, "GET", responses=not_ready)
     add("/metrics", routes.metrics, "GET", response_class=PlainTextResponse)

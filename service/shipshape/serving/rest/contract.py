@@ -11,7 +11,14 @@ from pydantic.json_schema import models_json_schema
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.rest.problems import MEDIA_TYPE, STATUS
 from shipshape.serving.rest.requests import JSON, PACKED, TIMEOUT_HEADER
-from shipshape.serving.rest.schemas import ContactBody, Problem, QueryFields, RecogniseBody, ScanBody
+from shipshape.serving.rest.schemas import (
+    CapacityFields,
+    ContactBody,
+    Problem,
+    QueryFields,
+    RecogniseBody,
+    ScanBody,
+)
 
 REF = "#/components/schemas/{model}"
 REQUESTS: Sequence[type[BaseModel]] = (ContactBody, RecogniseBody, ScanBody, Problem)
@@ -36,6 +43,11 @@ def scan_extra() -> dict[str, Any]:
     """Body and parameters of /v1/scan."""
     body = {JSON: {"schema": {"$ref": REF.format(model="ScanBody")}}}
     return {"requestBody": _body(body), "parameters": [_TIMEOUT]}
+
+
+def capacity_extra() -> dict[str, Any]:
+    """Parameters of /v1/capacity."""
+    return {"parameters": _in_query(CapacityFields)}
 
 
 def problems(*kinds: FaultKind) -> dict[int | str, dict[str, Any]]:
@@ -72,12 +84,16 @@ def _body(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _query() -> list[dict[str, Any]]:
-    schema = QueryFields.model_json_schema(ref_template=REF)
+    return _in_query(QueryFields, f"Only beside {PACKED}: ")
+
+
+def _in_query(fields: type[BaseModel], note: str = "") -> list[dict[str, Any]]:
+    schema = fields.model_json_schema(ref_template=REF)
     return [
         {
             "name": name,
             "in": "query",
-            "description": f"Only beside {PACKED}: {field.pop('description', name)}",
+            "description": f"{note}{field.pop('description', name)}",
             "schema": field,
         }
         for name, field in schema["properties"].items()

@@ -19,6 +19,7 @@ from shipshape.serving.encoding import (
     points_from_rows,
 )
 from shipshape.serving.rest.schemas import (
+    CapacityFields,
     ContactBody,
     ContactFields,
     OptionsFields,
@@ -63,6 +64,11 @@ def parse_packed(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple
     """One contact of packed points, everything else in the query."""
     fields = _validated(QueryFields, dict(query))
     return _contact(fields, points_from_bytes(body, limits)), _wishes(fields)
+
+
+def parse_capacity(query: Mapping[str, str]) -> CapacityFields:
+    """What somebody wants to know the capacity for."""
+    return _validated(CapacityFields, dict(query))
 
 
 def parse_json(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:

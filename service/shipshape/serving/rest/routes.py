@@ -1,17 +1,18 @@
 """The handlers of the REST door: translate, delegate to the core, translate back."""
 
-from collections.abc import Awaitable, Callable
-from typing import Any, TypeVar
+from collections.abc import Awaitable, Callable, Mapping
+from typing import TypeVar
 
 from fastapi import HTTPException, Request, Response
 from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
 from starlette.concurrency import run_in_threadpool
 
 from shipshape.errors import NotReady
-from shipshape.executor import Ticket
+from shipshape.executor import Lane, Ticket
 from shipshape.serving.core import Answer, Core, Scan, conclude, outcome_of
 from shipshape.serving.encoding import Wishes
 from shipshape.serving.faults import FaultKind, fault_of
+from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.rest import answers
 from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.problems import ID_HEADER, identify, problem
@@ -20,6 +21,7 @@ from shipshape.serving.rest.requests import (
     PACKED,
     decode_scan,
     media_type,
+    parse_capacity,
     parse_json,
     parse_packed,
     parse_scan,
@@ -55,6 +57,10 @@ class Routes:
     async def model(self, request: Request) -> Response:
         """What this service runs and what it accepts."""
         return await self._guarded(request, "model_info", self._model)
+
+    async def capacity(self, request: Request) -> Response:
+        """What the service would promise now, and how its latency budget is doing."""
+        return await self._guarded(request, "capacity", self._capacity)
 
     async def live(self) -> Response:
         """The process answers."""
@@ -99,10 +105,11 @@ class Routes:
                 return self._core.submit(model, contact, wishes, deadline), wishes
 
             ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
+        outcome.urgent = wishes.lane is not Lane.BATCH
         await until_settled([ticket], request)
         answer = ticket.result()
         outcome.kind = outcome_of(answer)
-        return await _run(lambda: _single(answer, wishes), small=not _bulky(wishes))
+        return await _run(lambda: self._single(answer, wishes), small=not _bulky(wishes))
 
     async def _scan(self, request: Request, outcome: Outcome) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
@@ -117,6 +124,7 @@ class Routes:
                 return ids, self._core.submit_scan(model, contacts, wishes, deadline), wishes
 
             ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
+        outcome.urgent = wishes.lane is not Lane.BATCH
         await until_settled(scan.tickets, request)
         small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
         return await _run(lambda: self._many(ids, scan, wishes), small=small)
@@ -125,9 +133,21 @@ class Routes:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
         return _json(answers.to_bytes(value))
 
+    async def _capacity(self, request: Request, _: Outcome) -> Response:
+        asked = parse_capacity(request.query_params)
+        capacity = self._core.capacity(asked.points, asked.lane)
+        return _json(answers.to_bytes(answers.from_capacity(capacity, self._metrics.budget.report())))
+
     def _many(self, ids: list[str], scan: Scan, wishes: Wishes) -> Response:
         outcomes, stage_ms = conclude(scan, "rest", self._metrics)
-        return _json(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), server_timing(stage_ms))
+        return self._timed(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), stage_ms)
+
+    def _single(self, answer: Answer, wishes: Wishes) -> Response:
+        return self._timed(answers.to_bytes(answers.from_answer(answer, wishes)), answer.recognition.stage_ms)
+
+    def _timed(self, content: bytes, stage_ms: Mapping[str, float]) -> Response:
+        headers = {"Server-Timing": server_timing(stage_ms), HTTP_HEADER: as_text(self._core.load())}
+        return Response(content, headers=headers, media_type=JSON)
 
     def _timeout(self, request: Request) -> float:
         return timeout_s(request, self._timeouts.default_ms)
@@ -142,11 +162,5 @@ def _bulky(wishes: Wishes) -> bool:
     return wishes.restored or wishes.images or wishes.png
 
 
-def _single(answer: Answer, wishes: Wishes) -> Response:
-    timing = server_timing(answer.recognition.stage_ms)
-    return _json(answers.to_bytes(answers.from_answer(answer, wishes)), timing)
-
-
-def _json(content: bytes, timing: str | None = None) -> Response:
-    headers: dict[str, Any] = {} if timing is None else {"Server-Timing": timing}
-    return Response(content, headers=headers, media_type=JSON)
+def _json(content: bytes) -> Response:
+    return Response(content, media_type=JSON)

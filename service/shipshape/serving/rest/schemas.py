@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
+from shipshape.budget import Level
 from shipshape.executor import Lane
 from shipshape.types import ImageMethod, Preset, Reason, Rung
 
@@ -53,6 +54,13 @@ class OptionsFields(_Asked):
     max_age_ms: float | None = Field(
         None, description="Needs captured_at: an answer about what is older is worth nothing, milliseconds."
     )
+
+
+class CapacityFields(_Asked):
+    """What is to be promised."""
+
+    points: int = Field(300, ge=1, description="Points of the contact.")
+    lane: Lane = Field(Lane.TRACKING, description="What it is for.")
 
 
 class ContactFields(_Asked):
@@ -210,6 +218,35 @@ class ModelAnswer(BaseModel):
     scores: dict[str, float] = Field(description="What the bundle reached when it was made.")
     stages: list[str] = Field(description="In the order of the data path.")
     limits: LimitsAnswer
+
+
+class PromiseAnswer(BaseModel):
+    """One rung of the ladder."""
+
+    rung: Rung
+    milliseconds: float = Field(description="In which a contact would be answered on it now.")
+
+
+class BudgetAnswer(BaseModel):
+    """How the latency budget is doing."""
+
+    level: Level = Field(description="warn: one was over budget a moment ago; error: none was good for a second.")
+    budget_ms: float
+    good: int = Field(description="Answers inside the budget since the start.")
+    bad: int = Field(description="Answers over it, refusals and faults of the service since the start.")
+    last_good_s: float | None = Field(description="Since the last good answer; null before the first.")
+    burn: dict[str, float] = Field(description="Of the error budget in each window; 1 is as fast as allowed.")
+
+
+class CapacityAnswer(BaseModel):
+    """What the service would promise now."""
+
+    promises: list[PromiseAnswer]
+    wait_ms: float = Field(description="Of that, until a worker is free.")
+    queue_depth: int = Field(description="Contacts that wait.")
+    running: int = Field(description="Contacts that are being computed.")
+    workers: int
+    budget: BudgetAnswer
 
 
 class Problem(BaseModel):
