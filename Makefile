@@ -44,8 +44,8 @@ gen: $(VENV)/.dev ## write the gRPC stubs again from proto/
 
 gen-check: $(VENV)/.dev ## the gRPC stubs are those of proto/
 	@fresh=$$(mktemp -d) && trap 'rm -rf "$$fresh"' EXIT && PYTHON=$(BIN)/python sh proto/generate.sh "$$fresh" && \
-	for stub in "$$fresh"/shipshape/v1/*; do \
-	  diff "$$stub" "service/shipshape/v1/$${stub##*/}" || { echo "make gen-check: expected the stubs of proto/, got others: run make gen" >&2; exit 1; }; \
+	for stub in "$$fresh"/shipshape/*/*; do \
+	  diff "$$stub" "service/$${stub#"$$fresh"/}" || { echo "make gen-check: expected the stubs of proto/, got others: run make gen" >&2; exit 1; }; \
 	done
 
 train: torch ## make the default bundle in the lab: data sets, networks, ONNX, manifest

@@ -1,7 +1,9 @@
-"""What every RPC of shipshape.v1 passes: limits, parsing, metrics, request id, and the one table of errors."""
+"""What every RPC of our services passes: limits, parsing, metrics, request id, and the one table of errors."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import grpc
@@ -10,7 +12,8 @@ from google.protobuf.message import DecodeError
 from shipshape.errors import InvalidInput
 from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import Fault, FaultKind, fault_of
-from shipshape.telemetry import DEGRADED, SCAN, SINGLE, Metrics, new_request_id, request_id
+from shipshape.serving.oip.models import UnknownModel
+from shipshape.telemetry import DEGRADED, SCAN, SINGLE, Metrics, Outcome, new_request_id, request_id
 from shipshape.types import Rung
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -24,24 +27,41 @@ STATUS = {
     FaultKind.NOT_READY: grpc.StatusCode.UNAVAILABLE,
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
-METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info", "GetCapacity": "capacity"}
-PREFIX = "/shipshape.v1.Shipshape/"
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
 
 
-class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
-    """Wraps the methods of shipshape.v1 and leaves health and reflection alone."""
+@dataclass(frozen=True, slots=True)
+class Guarded:
+    """A service whose RPCs are guarded."""
 
-    def __init__(self, metrics: Metrics, limits: Limits) -> None:
+    service: str
+    door: str  # in the metrics
+    methods: Mapping[str, str]  # RPC to its name in the metrics
+
+
+V1 = Guarded(
+    "shipshape.v1.Shipshape",
+    "grpc",
+    {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info", "GetCapacity": "capacity"},
+)
+current_outcome: ContextVar[Outcome] = ContextVar("outcome")  # of the RPC under way, for its servicer to write
+
+
+class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
+    """Wraps the methods of one service and leaves all others alone."""
+
+    def __init__(self, guarded: Guarded, metrics: Metrics, limits: Limits) -> None:
+        self._of = guarded
         self._metrics = metrics
         self._limits = limits
 
     def intercept_service(self, continuation: Any, handler_call_details: Any) -> Any:
         """The method's handler, guarded."""
         handler = continuation(handler_call_details)
-        if handler is None or not handler_call_details.method.startswith(PREFIX):
+        service, _, name = handler_call_details.method.removeprefix("/").partition("/")
+        if handler is None or service != self._of.service:
             return handler
-        method = METHODS[handler_call_details.method.removeprefix(PREFIX)]
+        method = self._of.methods[name]
         # No deserializer: gRPC would answer INTERNAL to bytes that do not parse, and that is not our fault.
         return grpc.unary_unary_rpc_method_handler(
             self._guarded(handler.unary_unary, handler.request_deserializer, method),
@@ -51,10 +71,11 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
     def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
         def call(raw: bytes, context: grpc.ServicerContext) -> Any:
             new_request_id(_proposed_id(context))
-            with self._metrics.request("grpc", method) as outcome:
+            with self._metrics.request(self._of.door, method) as outcome:
+                current_outcome.set(outcome)
                 try:
                     check_body(len(raw), self._limits)
-                    message = _parsed(raw, parse)
+                    message = _parsed(raw, parse, self._of.service)
                     if method == SCAN:
                         outcome.contacts = len(message.contacts)
                     outcome.urgent = method not in (SINGLE, SCAN) or message.options.lane != pb.LANE_BATCH
@@ -63,7 +84,8 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     fault = fault_of(error)
                     outcome.kind = fault.kind
                     set_trailing(context, ("shipshape-error", fault.kind), *_pushback(fault))
-                    _abort(context, STATUS[fault.kind], fault.message)
+                    unknown = isinstance(error, UnknownModel)
+                    _abort(context, grpc.StatusCode.NOT_FOUND if unknown else STATUS[fault.kind], fault.message)
                 if method == SINGLE and response.recognition.rung != Rung.FULL:
                     outcome.kind = DEGRADED
                 return response
@@ -83,12 +105,12 @@ def _pushback(fault: Fault) -> tuple[tuple[str, str], ...]:
     return (("grpc-retry-pushback-ms", str(math.ceil(fault.retry_after_s * 1e3))),)
 
 
-def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:
+def _parsed(raw: bytes, parse: Callable[[bytes], Any], service: str) -> Any:
     try:
         return parse(raw)
     except DecodeError as error:
         raise InvalidInput(
-            f"expected a message of shipshape.v1, got {len(raw)} bytes that do not parse as one"
+            f"expected a message of {service.rpartition('.')[0]}, got {len(raw)} bytes that do not parse as one"
         ) from error
 
 

@@ -9,6 +9,8 @@ from fastapi.responses import PlainTextResponse
 from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.rest import contract
+from shipshape.serving.rest.bodies import Bodies
+from shipshape.serving.rest.oip_routes import OipRoutes
 from shipshape.serving.rest.problems import add_handlers
 from shipshape.serving.rest.routes import Routes
 from shipshape.serving.rest.schemas import CapacityAnswer, ModelAnswer, RecognitionAnswer, ScanAnswer
@@ -28,7 +30,8 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts) -> FastAPI:
     app = FastAPI(
         title="Shipshape", version=version("shipshape"), description=DESCRIPTION, docs_url=None, redoc_url=None
     )
-    routes = Routes(core, metrics, timeouts)
+    bodies = Bodies(core.limits)
+    routes = Routes(core, metrics, timeouts, bodies)
     refusals = contract.problems(*(kind for kind in FaultKind if kind is not FaultKind.CANCELLED))
     not_ready = contract.problems(FaultKind.NOT_READY)
 
@@ -43,6 +46,7 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts) -> FastAPI:
     add("/livez", routes.live, "GET")
     add("/readyz", routes.ready, "GET", responses=not_ready)
     add("/metrics", routes.metrics, "GET", response_class=PlainTextResponse)
+    app.router.routes.extend(OipRoutes(core, metrics, timeouts, bodies).routes())
     add_handlers(app)
     contract.add_contract(app)
     return app

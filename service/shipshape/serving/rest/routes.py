@@ -40,11 +40,11 @@ SMALL_SCAN = 32  # contacts: written in under a millisecond
 class Routes:
     """One method a path. Large bodies are parsed and written off the event loop."""
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts) -> None:
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, bodies: Bodies) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
-        self._bodies = Bodies(core.limits)
+        self._bodies = bodies
 
     async def recognise(self, request: Request) -> Response:
         """One contact: JSON, or packed points with everything else in the query."""
