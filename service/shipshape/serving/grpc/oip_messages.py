@@ -7,7 +7,7 @@ from shipshape.errors import InvalidInput
 from shipshape.inference import open_inference_pb2 as pb
 from shipshape.serving.oip.convention import COUNTS, input_spec
 from shipshape.serving.oip.inference import InferRequest
-from shipshape.serving.oip.parameters import check_known
+from shipshape.serving.oip.parameters import RAW_SIZE, check_known
 from shipshape.serving.oip.tensors import NUMPY, Datatype, Tensor, check_header, from_raw, from_values, to_raw
 
 CONTENTS = {
@@ -32,7 +32,7 @@ def to_request(message: pb.ModelInferRequest) -> InferRequest:
     for index, each in enumerate(message.inputs):
         spec = input_spec(each.name, inputs)
         shape = check_header(spec, each.datatype, each.shape)
-        check_known(each.parameters, ())
+        _check_parameters(each, len(raw[index]) if raw else None)
         if not raw:
             inputs[each.name] = from_values(spec, shape, _contents(each, spec.datatype))
         elif each.HasField("contents"):
@@ -65,6 +65,16 @@ def count_contacts(message: pb.ModelInferRequest) -> int:
                 return len(message.raw_input_contents[index]) // NUMPY[COUNTS.datatype].itemsize
             return len(each.contents.int_contents)
     return 1
+
+
+def _check_parameters(tensor: pb.ModelInferRequest.InferInputTensor, raw_size: int | None) -> None:
+    """KServe's client repeats the size of raw data, which belongs to REST."""
+    given = dict(_parameters(tensor.parameters))
+    check_known(given, (RAW_SIZE,))
+    if RAW_SIZE in given and given[RAW_SIZE] != raw_size:
+        raise InvalidInput(
+            f"expected {RAW_SIZE} of input {tensor.name} as in raw_input_contents, got {given[RAW_SIZE]!r:.40}"
+        )
 
 
 def _contents(tensor: pb.ModelInferRequest.InferInputTensor, datatype: Datatype) -> Sequence[Any]:

@@ -10,6 +10,7 @@ from shipshape.types import ImageMethod, Options, Preset
 
 T = TypeVar("T", bound=StrEnum)
 PARAMETERS = ("preset", "image_method", "bundle", "timeout")
+RAW_SIZE = "binary_data_size"  # of an input: the bytes of its raw data
 
 
 def to_wishes(parameters: Mapping[str, Any], *, restored: bool) -> Wishes:
@@ -48,7 +49,8 @@ def check_known(parameters: Mapping[str, Any], known: tuple[str, ...]) -> None:
     """Raises InvalidInput for a parameter that is not one of `known`."""
     for name in parameters:
         if name not in known:
-            raise InvalidInput(f"expected only parameters {', '.join(known)} here, got {name!r:.80}")
+            wanted = f"only parameters {', '.join(known)}" if known else "no parameters"
+            raise InvalidInput(f"expected {wanted} here, got {name!r:.80}")
 
 
 def _choice(kind: type[T], parameters: Mapping[str, Any], name: str, default: T) -> T:

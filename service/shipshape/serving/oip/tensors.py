@@ -132,7 +132,7 @@ def _integers(spec: TensorSpec, values: Sequence[int]) -> Int32[np.ndarray, " n"
         raise InvalidInput(f"expected integers of 32 bits in input {spec.name}, got a larger one") from error
 
 
-def _floats(values: Sequence[float | None]) -> Float64[np.ndarray, " n"]:
+def _floats(values: Sequence[int | float | None]) -> Float64[np.ndarray, " n"]:
     try:
         return np.asarray(values, np.float64)
     except OverflowError:  # an integer beyond float64

@@ -18,12 +18,12 @@ from pydantic_core import from_json
 from shipshape.errors import InvalidInput
 from shipshape.serving.oip.convention import input_spec
 from shipshape.serving.oip.inference import InferRequest
-from shipshape.serving.oip.parameters import check_known
+from shipshape.serving.oip.parameters import RAW_SIZE, check_known
 from shipshape.serving.oip.tensors import Datatype, Tensor, check_header, from_raw, from_values, to_raw
 from shipshape.serving.rest.requests import sentence
 
 JSON_BYTES_HEADER = "Inference-Header-Content-Length"
-RAW_SIZE, RAW_OUTPUT, RAW_OUTPUTS = "binary_data_size", "binary_data", "binary_data_output"
+RAW_OUTPUT, RAW_OUTPUTS = "binary_data", "binary_data_output"
 # By type, not by what numpy makes of it: true and false would become 1 and 0 among numbers.
 ELEMENTS: dict[Datatype, set[type]] = {
     Datatype.BYTES: {str},
