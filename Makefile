@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 EDITABLE := $(PIP) install --no-build-isolation --no-deps --no-index
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch lock hooks
+.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch clients lock hooks
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -20,7 +20,7 @@ serve: $(VENV)/.service ## run the service on loopback until Ctrl-C
 
 setup: $(VENV)/.dev ## create .venv with everything but torch
 
-test: $(VENV)/.dev ## run the whole suite, but the training tests only after `make torch`
+test: $(VENV)/.dev $(VENV)/.clients ## run the whole suite, but the training tests only after `make torch`
 	@$(BIN)/python -m pytest -n 2
 
 check: lint types arch gen-check test ## everything a change must pass
@@ -54,6 +54,8 @@ train: torch ## make the default bundle in the lab: data sets, networks, ONNX, m
 torch: $(VENV)/.dev ## add torch, which only the lab and its tests use
 	@$(BIN)/python -c 'import torch' 2>/dev/null || $(PIP) install --requirement requirements/torch.txt
 
+clients: $(VENV)/.clients ## install the clients of other makers that the tests use, apart: they need older packages
+
 hooks: $(VENV)/.dev ## run the quick checks before each of your commits
 	@$(BIN)/pre-commit install
 
@@ -64,6 +66,7 @@ lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
 	@$(LOCK) pyproject.toml requirements/build.in --output-file requirements/service.lock
 	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in \
 	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
+	@$(LOCK) requirements/clients.in --output-file requirements/clients.lock
 
 # A stamp is older than its lock only when the lock changed: the second time, nothing is asked of the network.
 $(VENV)/.service: requirements/service.lock pyproject.toml | $(BIN)/python
@@ -76,6 +79,13 @@ $(VENV)/.dev: requirements/dev.lock lab/pyproject.toml $(VENV)/.service
 	@echo "installing what requirements/dev.lock pins"
 	@$(PIP) install --require-hashes --requirement requirements/dev.lock
 	@$(EDITABLE) --editable lab
+	@touch $@
+
+$(VENV)/.clients: requirements/clients.lock | $(BIN)/python
+	@echo "installing what requirements/clients.lock pins"
+	@$(BIN)/python -m venv --clear $(VENV)/clients
+	@$(VENV)/clients/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --require-hashes \
+	  --requirement requirements/clients.lock
 	@touch $@
 
 $(BIN)/python:
