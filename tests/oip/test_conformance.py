@@ -3,6 +3,9 @@
 import grpc
 import numpy as np
 import pytest
+from grpc_health.v1 import health_pb2
+from grpc_health.v1.health_pb2_grpc import HealthStub
+from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 
 from oip.wire import FORMS, INFER, by_binary, by_json, call, envelope, message, read, scan
 from serving.fakes import DIGEST, PATIENCE, cluster, running
@@ -270,6 +273,15 @@ def test_other_bodies_are_refused(doors, header):
     response = doors.rest.post(INFER, content=b"x", headers=header)
     assert response.status_code == 415
     assert response.json()["error"].startswith("expected a body ")
+
+
+def test_health_and_reflection_know_the_protocol(doors):
+    name = "inference.GRPCInferenceService"
+    check = health_pb2.HealthCheckRequest(service=name)
+    assert (
+        HealthStub(doors.channel).Check(check, timeout=PATIENCE).status == health_pb2.HealthCheckResponse.SERVING
+    )
+    assert name in ProtoReflectionDescriptorDatabase(doors.channel).get_services()
 
 
 def test_the_request_id_and_the_times_of_stages_come_back(doors):

@@ -34,6 +34,10 @@ BAD_INPUTS = {
     "an unknown input": (GOOD | {"colour": [b"red"]}, "expected only inputs points, counts"),
     "points of another type": ({"points": POINTS.astype(np.float64)}, "points of datatype FP32, got 'FP64'"),
     "points of two columns": ({"points": POINTS[:, :2]}, "points of shape [-1, 3], got [40, 2]"),
+    "points of many dimensions": (
+        {"points": POINTS.reshape([1] * 10 + [40, 3])},
+        "points of shape [-1, 3], got one of 12 dimensions",
+    ),
     "points in one row": ({"points": POINTS.reshape(-1)}, "points of shape [-1, 3], got [120]"),
     "counts of another rank": (GOOD | {"counts": integers([40])}, "counts of shape [-1], got [1, 1]"),
     "counts that are too few": (
@@ -285,6 +289,11 @@ def test_limits():
             assert huge.kind == "too_large"
             assert huge.error.startswith("expected at most 65536 bytes a request, got ")
             assert form(doors, scan(POINTS, POINTS)).outputs["error"] == ["", ""]
+            ids = form(doors, scan(POINTS, POINTS, contact_id=[b""] * 3))
+            assert (ids.kind, ids.error) == (three.kind, three.error)
         both = FORMS["grpc_raw"](doors, scan(many, POINTS)).outputs
         assert both["error"] == ["too_large", ""]
         assert by_json(doors, GOOD).status == 200
+        counters = doors.rest.get("/metrics").text
+    for door in ("oip_rest", "oip_grpc"):
+        assert f'shipshape_contacts_total{{door="{door}",outcome="too_large"}}' in counters

@@ -1,4 +1,4 @@
-"""Everything our tests ask of KServe's own clients: run with `kserve_client.py rest|grpc ADDRESS SCAN.npz`."""
+"""Everything our tests ask of KServe's own clients: `kserve_client.py REST GRPC SCAN.npz` prints JSON."""
 
 import asyncio
 import json
@@ -89,11 +89,11 @@ async def over_grpc(address, scan):
         }
 
 
-def main():
-    kind, address, path = sys.argv[1:]
+async def main():
+    rest, grpc_address, path = sys.argv[1:]
     scan = np.load(path, allow_pickle=False)
-    print(json.dumps(asyncio.run({"rest": over_rest, "grpc": over_grpc}[kind](address, scan))))
+    print(json.dumps({"rest": await over_rest(rest, scan), "grpc": await over_grpc(grpc_address, scan)}))
 
 
 if __name__ == "__main__":
-    main()
+    asyncio.run(main())

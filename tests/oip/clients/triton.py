@@ -1,4 +1,4 @@
-"""Everything our tests ask of Triton's own clients: run with `triton.py http|grpc ADDRESS SCAN.npz`."""
+"""Everything our tests ask of Triton's own clients: `triton.py REST GRPC SCAN.npz` prints JSON."""
 
 import importlib
 import json
@@ -45,16 +45,14 @@ def refusals(triton, client, errors):
             yield [error.status(), error.message()]
 
 
-def main():
-    kind, address, path = sys.argv[1:]
+def report(kind, address, scan):
     triton, errors = importlib.import_module(f"tritonclient.{kind}"), importlib.import_module("tritonclient.utils")
     client = triton.InferenceServerClient(address)
-    scan = np.load(path, allow_pickle=False)
     as_json = {"as_json": True} if kind == "grpc" else {}
     server, model = client.get_server_metadata(**as_json), client.get_model_metadata("shipshape", **as_json)
     binary = [{"binary_data": True}, {"binary_data": False}] if kind == "http" else [{}]
     everything = client.infer("shipshape", [tensor(triton, "points", "FP32", scan["points"][: scan["n"][0]])])
-    report = {
+    return {
         "live": client.is_server_live(),
         "ready": client.is_server_ready(),
         "model_ready": client.is_model_ready("shipshape"),
@@ -65,7 +63,12 @@ def main():
         "alone": listed(everything, ["vessel", "probabilities", "unknown", "error"]),
         "refusals": list(refusals(triton, client, errors)),
     }
-    print(json.dumps(report))
+
+
+def main():
+    rest, grpc, path = sys.argv[1:]
+    scan = np.load(path, allow_pickle=False)
+    print(json.dumps({"rest": report("http", rest, scan), "grpc": report("grpc", grpc, scan)}))
 
 
 if __name__ == "__main__":

@@ -5,10 +5,11 @@ from typing import Any
 
 from shipshape.errors import InvalidInput
 from shipshape.inference import open_inference_pb2 as pb
-from shipshape.serving.oip.convention import COUNTS, input_spec
+from shipshape.serving.encoding import Limits
+from shipshape.serving.oip.convention import COUNTS, check_header, find_input
 from shipshape.serving.oip.inference import InferRequest
 from shipshape.serving.oip.parameters import RAW_SIZE, check_known
-from shipshape.serving.oip.tensors import NUMPY, Datatype, Tensor, check_header, from_raw, from_values, to_raw
+from shipshape.serving.oip.tensors import NUMPY, Datatype, Tensor, from_raw, from_values, to_raw
 
 CONTENTS = {
     Datatype.BOOL: "bool_contents",
@@ -19,19 +20,20 @@ CONTENTS = {
 }
 
 
-def to_request(message: pb.ModelInferRequest) -> InferRequest:
+def to_request(message: pb.ModelInferRequest, limits: Limits) -> InferRequest:
     """The request of a message.
 
     Raises:
         InvalidInput: Tensors that are not the convention's, or contents that are not as their tensors say.
+        TooLarge: More contacts than the limit.
     """
     raw = message.raw_input_contents
     if raw and len(raw) != len(message.inputs):
         raise InvalidInput(f"expected raw_input_contents of all {len(message.inputs)} inputs, got {len(raw)}")
     inputs: dict[str, Tensor] = {}
     for index, each in enumerate(message.inputs):
-        spec = input_spec(each.name, inputs)
-        shape = check_header(spec, each.datatype, each.shape)
+        spec = find_input(each.name, inputs)
+        shape = check_header(spec, each.datatype, each.shape, limits)
         _check_parameters(each, len(raw[index]) if raw else None)
         if not raw:
             inputs[each.name] = from_values(spec, shape, _contents(each, spec.datatype))

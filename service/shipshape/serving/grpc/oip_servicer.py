@@ -77,7 +77,7 @@ class OipServicer(pb_grpc.GRPCInferenceServiceServicer):
         """Contacts of one scan; one that is alone fails as a whole."""
         model = models.find_model(self._core, request.model_name, request.model_version)
         deadline = deadline_of(self._core, self._timeouts, context)
-        inference = submit(self._core, model, oip_messages.to_request(request), deadline)
+        inference = submit(self._core, model, oip_messages.to_request(request, self._core.limits), deadline)
         cancel_with(context, inference.tickets)
         tensors, stage_ms = inference.conclude(GUARDED.door, self._metrics)
         set_timing(context, stage_ms)

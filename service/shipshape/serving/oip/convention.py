@@ -1,6 +1,6 @@
 """The convention for clusters of any size: which tensors make contacts. docs/oip.md explains it to callers."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ SENSOR_HEIGHT = TensorSpec("sensor_height_m", Datatype.FP64, (-1,))
 OWN_HEADING = TensorSpec("own_true_heading_deg", Datatype.FP64, (-1,))
 CONTACT_ID = TensorSpec("contact_id", Datatype.BYTES, (-1,))
 INPUTS = {spec.name: spec for spec in (POINTS, COUNTS, SENSOR_HEIGHT, OWN_HEADING, CONTACT_ID)}
+MANY_DIMENSIONS = 8  # too many to repeat to the caller
 OPTIONAL_INPUTS = [name for name in INPUTS if name != POINTS.name]
 
 TEXT = (
@@ -26,7 +27,7 @@ TEXT = (
 )
 
 
-def input_spec(name: str, taken: Iterable[str]) -> TensorSpec:
+def find_input(name: str, taken: Container[str]) -> TensorSpec:
     """The spec of an input.
 
     Raises:
@@ -37,6 +38,26 @@ def input_spec(name: str, taken: Iterable[str]) -> TensorSpec:
     if name not in INPUTS:
         raise InvalidInput(f"expected only inputs {', '.join(INPUTS)}, got {name!r:.80}")
     return INPUTS[name]
+
+
+def check_header(spec: TensorSpec, datatype: str, shape: Sequence[int], limits: Limits) -> tuple[int, ...]:
+    """The shape that a caller gives an input, before any of its elements is looked at.
+
+    Raises:
+        InvalidInput: Another data type or shape than the spec's.
+        TooLarge: More contacts than the limit.
+    """
+    if datatype != spec.datatype:
+        raise InvalidInput(f"expected input {spec.name} of datatype {spec.datatype}, got {datatype!r:.40}")
+    fits = len(shape) == len(spec.shape) and all(
+        size >= 0 and wanted in (-1, size) for size, wanted in zip(shape, spec.shape, strict=True)
+    )
+    if not fits:
+        given = f"{list(shape)!s:.80}" if len(shape) < MANY_DIMENSIONS else f"one of {len(shape)} dimensions"
+        raise InvalidInput(f"expected input {spec.name} of shape {list(spec.shape)}, got {given}")
+    if spec not in (POINTS, COUNTS):  # those are counted first, so that the metrics know how many were refused
+        check_contacts(shape[0], limits)
+    return tuple(shape)
 
 
 def count_contacts(inputs: Mapping[str, Tensor]) -> int:

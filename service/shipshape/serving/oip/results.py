@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,6 @@ from shipshape.serving.oip.tensors import NUMPY, Datatype, Tensor, TensorSpec
 from shipshape.types import Recognition
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """An output with one row a contact; the row of a contact without an answer is NaN, false or empty."""
-
-    spec: TensorSpec
-    of: Callable[[Recognition], Any]
-
-
-def _column(name: str, datatype: Datatype, of: Callable[[Recognition], Any], *row: int) -> Column:
-    return Column(TensorSpec(name, datatype, (-1, *row)), of)
-
-
 def _true_heading(found: Recognition) -> float:
     return math.nan if found.true_heading_deg is None else found.true_heading_deg
 
@@ -36,23 +23,24 @@ def _box(found: Recognition) -> list[float]:
     return [*found.box.center_level, size.length, size.beam, size.height]
 
 
-COLUMNS = (
-    _column("vessel", Datatype.BYTES, lambda found: found.vessel),
-    _column("probability", Datatype.FP64, lambda found: found.probability),
-    _column("probabilities", Datatype.FP64, lambda found: list(found.probabilities.values()), -1),
-    _column("unknown", Datatype.BOOL, lambda found: found.unknown),
-    _column("reasons", Datatype.BYTES, lambda found: ",".join(found.reasons)),
-    _column("heading", Datatype.FP64, lambda found: found.heading),
-    _column("heading_std", Datatype.FP64, lambda found: found.heading_std),
-    _column("bow_probability", Datatype.FP64, lambda found: found.bow_probability),
-    _column("aspect_deg", Datatype.FP64, lambda found: found.aspect_deg),
-    _column("true_heading_deg", Datatype.FP64, _true_heading),
-    _column("box", Datatype.FP64, _box, 6),
-    _column("rung", Datatype.BYTES, lambda found: found.rung),
-)
+# Outputs with one row a contact; the row of a contact without an answer is NaN, false or empty.
+COLUMNS: dict[TensorSpec, Callable[[Recognition], Any]] = {
+    TensorSpec("vessel", Datatype.BYTES, (-1,)): lambda found: found.vessel,
+    TensorSpec("probability", Datatype.FP64, (-1,)): lambda found: found.probability,
+    TensorSpec("probabilities", Datatype.FP64, (-1, -1)): lambda found: list(found.probabilities.values()),
+    TensorSpec("unknown", Datatype.BOOL, (-1,)): lambda found: found.unknown,
+    TensorSpec("reasons", Datatype.BYTES, (-1,)): lambda found: ",".join(found.reasons),
+    TensorSpec("heading", Datatype.FP64, (-1,)): lambda found: found.heading,
+    TensorSpec("heading_std", Datatype.FP64, (-1,)): lambda found: found.heading_std,
+    TensorSpec("bow_probability", Datatype.FP64, (-1,)): lambda found: found.bow_probability,
+    TensorSpec("aspect_deg", Datatype.FP64, (-1,)): lambda found: found.aspect_deg,
+    TensorSpec("true_heading_deg", Datatype.FP64, (-1,)): _true_heading,
+    TensorSpec("box", Datatype.FP64, (-1, 6)): _box,
+    TensorSpec("rung", Datatype.BYTES, (-1,)): lambda found: found.rung,
+}
 ERROR = TensorSpec("error", Datatype.BYTES, (-1,))
 DETAIL = TensorSpec("detail", Datatype.BYTES, (-1,))
-DEFAULT_OUTPUTS = [CONTACT_ID, *(column.spec for column in COLUMNS), ERROR, DETAIL]
+DEFAULT_OUTPUTS = [CONTACT_ID, *COLUMNS, ERROR, DETAIL]
 RESTORED_POINTS = TensorSpec("restored_points", Datatype.FP32, (-1, 3))
 RESTORED_MEASURED = TensorSpec("restored_measured", Datatype.BOOL, (-1,))
 RESTORED_COUNTS = TensorSpec("restored_counts", Datatype.INT32, (-1,))
@@ -80,32 +68,31 @@ def to_tensors(
     """The outputs `specs`; `classes` is how many columns the probabilities have."""
     faults = [outcome if isinstance(outcome, Fault) else None for outcome in outcomes]
     found = [None if isinstance(outcome, Fault) else outcome.recognition for outcome in outcomes]
-    columns = {column.spec: column for column in COLUMNS}
+    beside = {
+        CONTACT_ID: contact_ids,
+        ERROR: [fault.kind if fault else "" for fault in faults],
+        DETAIL: [fault.message if fault else "" for fault in faults],
+    }
     tensors: list[Tensor] = []
     for spec in specs:
-        if spec in columns:
-            tensors.append(_rows(columns[spec], found, classes))
+        if spec in beside:
+            tensors.append(_texts(spec, beside[spec]))
         elif spec in RESTORED:
             tensors.append(_restored(spec, found))
         else:
-            texts = {
-                CONTACT_ID: contact_ids,
-                ERROR: [fault.kind if fault else "" for fault in faults],
-                DETAIL: [fault.message if fault else "" for fault in faults],
-            }
-            tensors.append(_texts(spec, texts[spec]))
+            tensors.append(_rows(spec, found, classes))
     return tensors
 
 
-def _rows(column: Column, found: Sequence[Recognition | None], classes: int) -> Tensor:
-    spec = column.spec
+def _rows(spec: TensorSpec, found: Sequence[Recognition | None], classes: int) -> Tensor:
+    of = COLUMNS[spec]
     if spec.datatype is Datatype.BYTES:
-        return _texts(spec, ["" if one is None else column.of(one) for one in found])
+        return _texts(spec, ["" if one is None else of(one) for one in found])
     shape = (len(found), *(classes if size == -1 else size for size in spec.shape[1:]))
     values = np.full(shape, False if spec.datatype is Datatype.BOOL else math.nan, NUMPY[spec.datatype])
     for row, one in enumerate(found):
         if one is not None:
-            values[row] = column.of(one)
+            values[row] = of(one)
     return Tensor(spec, shape, values.reshape(-1))
 
 

@@ -57,22 +57,6 @@ class Tensor:
     values: Values
 
 
-def check_header(spec: TensorSpec, datatype: str, shape: Sequence[int]) -> tuple[int, ...]:
-    """The shape that a caller gives an input.
-
-    Raises:
-        InvalidInput: Another data type or shape than the spec's.
-    """
-    if datatype != spec.datatype:
-        raise InvalidInput(f"expected input {spec.name} of datatype {spec.datatype}, got {datatype!r:.40}")
-    fits = len(shape) == len(spec.shape) and all(
-        size >= 0 and wanted in (-1, size) for size, wanted in zip(shape, spec.shape, strict=True)
-    )
-    if not fits:
-        raise InvalidInput(f"expected input {spec.name} of shape {list(spec.shape)}, got {list(shape)!s:.80}")
-    return tuple(shape)
-
-
 def from_raw(spec: TensorSpec, shape: tuple[int, ...], raw: bytes) -> Tensor:
     """The tensor of raw data.
 

@@ -16,10 +16,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import from_json
 
 from shipshape.errors import InvalidInput
-from shipshape.serving.oip.convention import input_spec
+from shipshape.serving.encoding import Limits
+from shipshape.serving.oip.convention import check_header, find_input
 from shipshape.serving.oip.inference import InferRequest
 from shipshape.serving.oip.parameters import RAW_SIZE, check_known
-from shipshape.serving.oip.tensors import Datatype, Tensor, check_header, from_raw, from_values, to_raw
+from shipshape.serving.oip.tensors import Datatype, Tensor, from_raw, from_values, to_raw
 from shipshape.serving.rest.requests import sentence
 
 JSON_BYTES_HEADER = "Inference-Header-Content-Length"
@@ -73,16 +74,18 @@ class Asked:
     raw_outputs: frozenset[str] | None  # names of outputs wished as raw data; None: all of them
 
 
-def parse_infer(body: bytes, json_bytes: str | None, model_name: str) -> Asked:
+def parse_infer(body: bytes, json_bytes: str | None, model_name: str, limits: Limits) -> Asked:
     """The request of a body.
 
     Args:
         body: The JSON, and the raw tensors behind it.
         json_bytes: The header that says how long the JSON is; None: it is all of the body.
         model_name: Of the path.
+        limits: Bound the contacts.
 
     Raises:
         InvalidInput: Not the protocol's form, or tensors that are not the convention's.
+        TooLarge: More contacts than the limit.
     """
     end = _json_end(body, json_bytes)
     envelope = _envelope(body[:end])
@@ -91,7 +94,7 @@ def parse_infer(body: bytes, json_bytes: str | None, model_name: str) -> Asked:
     parameters = dict(envelope.parameters or {})
     all_raw = _flag(parameters, RAW_OUTPUTS, default=False)
     raw = {output.name: _wants_raw(output, all_raw) for output in envelope.outputs or []}
-    request = InferRequest(_inputs(envelope.inputs, memoryview(body)[end:]), list(raw), parameters)
+    request = InferRequest(_inputs(envelope.inputs, memoryview(body)[end:], limits), list(raw), parameters)
     if envelope.outputs and len(raw) < len(envelope.outputs):
         raise InvalidInput("expected each output once, got one of them again")
     raw_outputs = frozenset(name for name in raw if raw[name])
@@ -143,12 +146,12 @@ def _envelope(text: bytes) -> InferBody:
         raise InvalidInput(f"expected JSON, got {len(text)} bytes that are not: {error}") from error
 
 
-def _inputs(bodies: Sequence[InputBody], behind: memoryview) -> dict[str, Tensor]:
+def _inputs(bodies: Sequence[InputBody], behind: memoryview, limits: Limits) -> dict[str, Tensor]:
     inputs: dict[str, Tensor] = {}
     at = 0
     for body in bodies:
-        spec = input_spec(body.name, inputs)
-        shape = check_header(spec, body.datatype, body.shape)
+        spec = find_input(body.name, inputs)
+        shape = check_header(spec, body.datatype, body.shape, limits)
         parameters = body.parameters or {}
         check_known(parameters, (RAW_SIZE,))
         if RAW_SIZE in parameters:

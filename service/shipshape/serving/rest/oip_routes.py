@@ -97,7 +97,7 @@ class OipRoutes:
         async with self._bodies.read(request, seconds) as body:
 
             def begin() -> tuple[Asked, Inference]:
-                asked = parse_infer(body, request.headers.get(JSON_BYTES_HEADER), models.NAME)
+                asked = parse_infer(body, request.headers.get(JSON_BYTES_HEADER), models.NAME, self._core.limits)
                 outcome.contacts = count_contacts(asked.request.inputs)
                 return asked, submit(self._core, model, asked.request, deadline)
 
