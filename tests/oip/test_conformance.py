@@ -11,10 +11,19 @@ from oip.wire import FORMS, INFER, by_binary, by_json, call, envelope, message, 
 from serving.fakes import DIGEST, PATIENCE, cluster, running
 from shipshape.inference import open_inference_pb2 as pb
 from shipshape.inference.open_inference_pb2_grpc import GRPCInferenceServiceStub
+from shipshape.types import ImageMethod, Options, Preset, Rung
 
 POINTS = cluster()
 VERSION = DIGEST[:12]
 MODEL = "/v2/models/shipshape"
+PARAMETERS = {
+    "preset": "paper",
+    "image_method": "z_top",
+    "lowest_rung": "full",
+    "lane": "collision",
+    "bundle": "fake",
+    "captured_at": 1e9,
+}
 each_form = pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 each_version = pytest.mark.parametrize("version", ["", f"/versions/{VERSION}"])
 
@@ -124,6 +133,7 @@ def test_an_inference(doors, form):
         "vessel": ["tug"],
         "reasons": ["few_points,end_on"],
         "rung": ["full"],
+        "rung_reason": [""],
         "error": [""],
         "detail": [""],
     }
@@ -162,15 +172,14 @@ def test_the_optional_id_is_returned(doors, form):
 
 @each_form
 def test_parameters_reach_the_pipeline(doors, form):
-    """The stage `prior` of the fake says nothing of the preset, but its answer's milliseconds are there."""
     seen = []
     begin = doors.pipeline.begin
     doors.pipeline.begin = lambda contact, options: seen.append(options) or begin(contact, options)
     try:
-        form(doors, {"points": POINTS}, parameters={"preset": "paper", "image_method": "z_top", "bundle": "fake"})
+        form(doors, {"points": POINTS}, parameters=PARAMETERS)
     finally:
         doors.pipeline.begin = begin
-    assert [(options.preset, options.image_method) for options in seen] == [("paper", "z_top")]
+    assert seen == [Options(Preset.PAPER, ImageMethod.Z_TOP, Rung.FULL)]
 
 
 @each_form

@@ -67,12 +67,16 @@ def test_bad_inputs(doors, form, name):
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [
-        ({"colour": "red"}, "expected only parameters preset, image_method, bundle, timeout here, got 'colour'"),
+        ({"colour": "red"}, "expected only parameters preset, image_method, lowest_rung, lane"),
         ({"preset": "worst"}, "expected parameter preset to be one of paper, best, got 'worst'"),
         ({"preset": 1}, "parameter preset to be one of paper, best, got 1"),
         ({"image_method": True}, "parameter image_method"),
         ({"bundle": "other"}, "expected bundle fake"),
         ({"bundle": 3}, "expected parameter bundle to be a string, got 3"),
+        ({"lane": "fast"}, "expected parameter lane to be one of collision, tracking, batch, got 'fast'"),
+        ({"lowest_rung": 1}, "expected parameter lowest_rung to be one of full"),
+        ({"captured_at": "now"}, "expected parameter captured_at to be a number, got 'now'"),
+        ({"max_age_ms": 0}, "expected max_age_ms above 0, got 0"),
         ({"timeout": 0}, "parameter timeout as whole microseconds above 0, got 0"),
         ({"timeout": -1}, "microseconds above 0, got -1"),
         ({"timeout": True}, "microseconds above 0, got True"),

@@ -1,5 +1,6 @@
 """Deadlines, leaving callers, a full queue and the counters, through every form of the protocol."""
 
+import re
 import socket
 
 import grpc
@@ -36,6 +37,18 @@ def test_the_deadlines_of_both_doors_hold(inputs):
         assert call(doors, message(inputs), timeout=0.05).status is grpc.StatusCode.DEADLINE_EXCEEDED
 
 
+@each_form
+def test_what_is_too_old_is_refused(form):
+    with running() as doors:
+        stale = form(doors, {"points": POINTS}, parameters={"captured_at": 1e9, "max_age_ms": 1000})
+        assert stale.kind == "deadline_exceeded"
+        typed = doors.ask_rest(POINTS, captured_at=1e9, max_age_ms=1000).json()
+        assert (stale.kind, re.sub(r"\d+", "", stale.error)) == (
+            typed["error"],
+            re.sub(r"\d+", "", typed["detail"]),
+        )
+
+
 def test_the_work_of_callers_who_leave_is_dropped():
     with running() as doors:
         rpc = GRPCInferenceServiceStub(doors.channel).ModelInfer.future(message(HOLD), timeout=PATIENCE)
@@ -60,8 +73,10 @@ def test_a_full_queue_refuses():
         assert doors.pipeline.entered.acquire(timeout=PATIENCE)
         waiting = stub.ModelInfer.future(message(scan(POINTS, POINTS)), timeout=PATIENCE)
         until(lambda: doors.service.executor.queue_depth == 2)
-        assert by_json(doors, {"points": POINTS}).status == 429
-        assert by_grpc_raw(doors, scan(POINTS, POINTS)).status is grpc.StatusCode.RESOURCE_EXHAUSTED
+        by_rest, by_grpc = by_json(doors, {"points": POINTS}), by_grpc_raw(doors, scan(POINTS, POINTS))
+        assert (by_rest.status, by_grpc.status) == (429, grpc.StatusCode.RESOURCE_EXHAUSTED)
+        assert int(by_rest.headers["retry-after"]) >= 1
+        assert int(by_grpc.headers["grpc-retry-pushback-ms"]) >= 1
         doors.pipeline.release.set()
         assert len(running_call.result().outputs) == len(waiting.result().outputs) > 0
 

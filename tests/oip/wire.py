@@ -98,7 +98,8 @@ def binary(inputs, outputs=(), parameters=None, **fields):
 
 
 def by_json(doors, inputs, outputs=(), parameters=None, **fields):
-    return read(doors.rest.post(INFER, json=envelope(inputs, outputs, parameters, **fields)))
+    # httpx itself refuses to write infinity.
+    return read(doors.rest.post(INFER, content=json.dumps(envelope(inputs, outputs, parameters, **fields))))
 
 
 def by_binary(doors, inputs, outputs=(), parameters=None, **fields):

@@ -6,10 +6,10 @@ from typing import Any
 from shipshape.errors import InvalidInput
 from shipshape.inference import open_inference_pb2 as pb
 from shipshape.serving.encoding import Limits
-from shipshape.serving.oip.convention import COUNTS, check_header, find_input
+from shipshape.serving.oip.convention import check_header, find_input
 from shipshape.serving.oip.inference import InferRequest
 from shipshape.serving.oip.parameters import RAW_SIZE, check_known
-from shipshape.serving.oip.tensors import NUMPY, Datatype, Tensor, from_raw, from_values, to_raw
+from shipshape.serving.oip.tensors import Datatype, Tensor, from_raw, from_values, to_raw
 
 CONTENTS = {
     Datatype.BOOL: "bool_contents",
@@ -57,16 +57,6 @@ def from_tensors(tensors: Sequence[Tensor], *, raw: bool) -> pb.ModelInferRespon
             values = tensor.values if isinstance(tensor.values, list) else tensor.values.tolist()
             getattr(output.contents, CONTENTS[tensor.spec.datatype]).extend(values)
     return message
-
-
-def count_contacts(message: pb.ModelInferRequest) -> int:
-    """How many contacts a request brings, before it is known to be sound."""
-    for index, each in enumerate(message.inputs):
-        if each.name == COUNTS.name:
-            if index < len(message.raw_input_contents):
-                return len(message.raw_input_contents[index]) // NUMPY[COUNTS.datatype].itemsize
-            return len(each.contents.int_contents)
-    return 1
 
 
 def _check_parameters(tensor: pb.ModelInferRequest.InferInputTensor, raw_size: int | None) -> None:

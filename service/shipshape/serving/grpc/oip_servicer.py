@@ -6,15 +6,14 @@ from shipshape.inference import open_inference_pb2 as pb
 from shipshape.inference import open_inference_pb2_grpc as pb_grpc
 from shipshape.serving.core import Core
 from shipshape.serving.grpc import oip_messages
-from shipshape.serving.grpc.guard import Guarded, set_trailing
+from shipshape.serving.grpc.guard import Guarded, current_outcome, set_trailing
 from shipshape.serving.grpc.servicer import cancel_with, deadline_of, set_timing
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import submit
 from shipshape.serving.timing import Timeouts
-from shipshape.telemetry import Metrics
+from shipshape.telemetry import INFER, Metrics
 
 SERVICE = pb.DESCRIPTOR.services_by_name["GRPCInferenceService"].full_name
-INFER = "infer"
 METHODS = {
     "ServerLive": "server_live",
     "ServerReady": "server_ready",
@@ -23,12 +22,7 @@ METHODS = {
     "ModelMetadata": "model_metadata",
     "ModelInfer": INFER,
 }
-GUARDED = Guarded(
-    SERVICE,
-    "oip_grpc",
-    METHODS,
-    lambda method, message: oip_messages.count_contacts(message) if method == INFER else 0,
-)
+GUARDED = Guarded(SERVICE, "oip_grpc", METHODS)
 
 
 class OipServicer(pb_grpc.GRPCInferenceServiceServicer):
@@ -77,10 +71,11 @@ class OipServicer(pb_grpc.GRPCInferenceServiceServicer):
         """Contacts of one scan; one that is alone fails as a whole."""
         model = models.find_model(self._core, request.model_name, request.model_version)
         deadline = deadline_of(self._core, self._timeouts, context)
-        inference = submit(self._core, model, oip_messages.to_request(request, self._core.limits), deadline)
+        asked = oip_messages.to_request(request, self._core.limits)
+        inference = submit(self._core, model, asked, deadline, current_outcome.get())
         cancel_with(context, inference.tickets)
-        tensors, stage_ms = inference.conclude(GUARDED.door, self._metrics)
-        set_timing(context, stage_ms)
+        tensors, stage_ms = inference.conclude(GUARDED.door, self._metrics, current_outcome.get())
+        set_timing(context, stage_ms, self._core.load())
         response = oip_messages.from_tensors(tensors, raw=bool(request.raw_input_contents))
         response.model_name, response.model_version = models.NAME, models.version_of(model)
         response.id = request.id

@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from shipshape.executor import Ticket
-from shipshape.serving.core import Answer, Core, Model, Scan, conclude
-from shipshape.serving.oip.convention import to_contacts
+from shipshape.executor import Lane, Ticket
+from shipshape.serving.core import Answer, Core, Model, Scan, conclude, outcome_of
+from shipshape.serving.oip.convention import count_contacts, to_contacts
 from shipshape.serving.oip.models import classes_of
 from shipshape.serving.oip.parameters import timeout_s, to_wishes
 from shipshape.serving.oip.results import RESTORED, output_specs, to_tensors
 from shipshape.serving.oip.tensors import Tensor, TensorSpec
-from shipshape.telemetry import OK, Metrics
+from shipshape.telemetry import Metrics, Outcome
 from shipshape.types import Contact
 
 
@@ -43,8 +43,8 @@ class Inference:
         """Whether the outputs hold whole clouds."""
         return any(spec in RESTORED for spec in self.specs)
 
-    def conclude(self, door: str, metrics: Metrics) -> tuple[list[Tensor], dict[str, float]]:
-        """Wait and count the contacts.
+    def conclude(self, door: str, metrics: Metrics, outcome: Outcome) -> tuple[list[Tensor], dict[str, float]]:
+        """Wait, count the contacts, and tell `outcome` when the only one is of a lower rung.
 
         Returns:
             The outputs, and the milliseconds of each stage over all contacts.
@@ -56,12 +56,13 @@ class Inference:
             outcomes, stage_ms = conclude(self.work, door, metrics)
             return to_tensors(self.specs, self.contact_ids, outcomes, self.classes), stage_ms
         answer = self.work.result()
-        metrics.count_contacts(door, [OK])
+        outcome.kind = outcome_of(answer)
+        metrics.count_contacts(door, [outcome.kind])
         stage_ms = dict(answer.recognition.stage_ms)
         return to_tensors(self.specs, self.contact_ids, [answer], self.classes), stage_ms
 
 
-def submit(core: Core, model: Model, request: InferRequest, deadline: float) -> Inference:
+def submit(core: Core, model: Model, request: InferRequest, deadline: float, outcome: Outcome) -> Inference:
     """Queue the contacts of a request.
 
     Args:
@@ -69,14 +70,17 @@ def submit(core: Core, model: Model, request: InferRequest, deadline: float) -> 
         model: From `find_model`.
         request: As it came.
         deadline: From `Core.deadline_in`; parameter timeout can only bring it nearer.
+        outcome: Told how many contacts there are, and whether they are urgent.
 
     Raises:
         InvalidInput: Tensors or parameters that do not make contacts and wishes.
         Overloaded, DeadlineExceeded, NotReady: As `Core.submit_scan`.
     """
+    outcome.contacts = count_contacts(request.inputs)
     parameters = request.parameters or {}
     specs = output_specs(request.outputs)
     wishes = to_wishes(parameters, restored=any(spec in RESTORED for spec in specs))
+    outcome.urgent = wishes.lane is not Lane.BATCH
     seconds = timeout_s(parameters)
     if seconds is not None:
         deadline = min(deadline, core.deadline_in(seconds))

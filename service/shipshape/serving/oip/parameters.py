@@ -5,11 +5,21 @@ from enum import StrEnum
 from typing import Any, TypeVar
 
 from shipshape.errors import InvalidInput
-from shipshape.serving.encoding import Wishes
-from shipshape.types import ImageMethod, Options, Preset
+from shipshape.executor import Lane
+from shipshape.serving.encoding import Wishes, make_wishes, to_float
+from shipshape.types import ImageMethod, Options, Preset, Rung
 
 T = TypeVar("T", bound=StrEnum)
-PARAMETERS = ("preset", "image_method", "bundle", "timeout")
+PARAMETERS = (
+    "preset",
+    "image_method",
+    "lowest_rung",
+    "lane",
+    "bundle",
+    "captured_at",
+    "max_age_ms",
+    "timeout",
+)
 RAW_SIZE = "binary_data_size"  # of an input: the bytes of its raw data
 
 
@@ -21,11 +31,15 @@ def to_wishes(parameters: Mapping[str, Any], *, restored: bool) -> Wishes:
     """
     check_known(parameters, PARAMETERS)
     default = Options()
-    return Wishes(
+    return make_wishes(
         options=Options(
             preset=_choice(Preset, parameters, "preset", default.preset),
             image_method=_choice(ImageMethod, parameters, "image_method", default.image_method),
+            lowest_rung=_choice(Rung, parameters, "lowest_rung", default.lowest_rung),
         ),
+        lane=_choice(Lane, parameters, "lane", Lane.TRACKING),
+        captured_at=_number(parameters, "captured_at"),
+        max_age_ms=_number(parameters, "max_age_ms"),
         bundle=_text(parameters, "bundle"),
         restored=restored,
     )
@@ -58,6 +72,15 @@ def _choice(kind: type[T], parameters: Mapping[str, Any], name: str, default: T)
     if value not in list(kind):
         raise InvalidInput(f"expected parameter {name} to be one of {', '.join(kind)}, got {value!r:.80}")
     return kind(value)
+
+
+def _number(parameters: Mapping[str, Any], name: str) -> float | None:
+    value = parameters.get(name)
+    if name not in parameters:
+        return None
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise InvalidInput(f"expected parameter {name} to be a number, got {value!r:.80}")
+    return to_float(value)
 
 
 def _text(parameters: Mapping[str, Any], name: str) -> str:

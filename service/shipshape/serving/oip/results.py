@@ -37,6 +37,7 @@ COLUMNS: dict[TensorSpec, Callable[[Recognition], Any]] = {
     TensorSpec("true_heading_deg", Datatype.FP64, (-1,)): _true_heading,
     TensorSpec("box", Datatype.FP64, (-1, 6)): _box,
     TensorSpec("rung", Datatype.BYTES, (-1,)): lambda found: found.rung,
+    TensorSpec("rung_reason", Datatype.BYTES, (-1,)): lambda found: found.rung_reason,
 }
 ERROR = TensorSpec("error", Datatype.BYTES, (-1,))
 DETAIL = TensorSpec("detail", Datatype.BYTES, (-1,))

@@ -11,17 +11,17 @@ from starlette.routing import Route
 
 from shipshape.serving.core import Core, Model
 from shipshape.serving.faults import Fault, FaultKind, fault_of
+from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.oip import models
-from shipshape.serving.oip.convention import count_contacts
 from shipshape.serving.oip.inference import Inference, submit
 from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.oip_bodies import JSON_BYTES_HEADER, Asked, parse_infer, write_answer
-from shipshape.serving.rest.problems import ID_HEADER, STATUS, identify
+from shipshape.serving.rest.problems import ID_HEADER, STATUS, identify, retry_headers
 from shipshape.serving.rest.requests import JSON, PACKED, media_type, timeout_s
 from shipshape.serving.rest.routes import SMALL_BYTES, SMALL_SCAN
 from shipshape.serving.rest.waiting import until_settled
 from shipshape.serving.timing import Timeouts, server_timing
-from shipshape.telemetry import Metrics, Outcome, request_id
+from shipshape.telemetry import INFER, Metrics, Outcome, request_id
 
 DOOR = "oip_rest"
 Handler = Callable[[Request, Outcome], Awaitable[Response]]
@@ -54,7 +54,7 @@ class OipRoutes:
         for path in (model, model + "/versions/{version}"):
             found.append(self._route(path, "GET", "model_metadata", self._model_metadata))
             found.append(self._route(path + "/ready", "GET", "model_ready", self._model_ready))
-            found.append(self._route(path + "/infer", "POST", "infer", self._infer))
+            found.append(self._route(path + "/infer", "POST", INFER, self._infer))
         return [*found, self._route("/v2/{path:path}", "", "unknown", self._unknown)]
 
     def _route(self, path: str, verb: str, method: str, handle: Handler) -> Route:
@@ -98,24 +98,23 @@ class OipRoutes:
 
             def begin() -> tuple[Asked, Inference]:
                 asked = parse_infer(body, request.headers.get(JSON_BYTES_HEADER), models.NAME, self._core.limits)
-                outcome.contacts = count_contacts(asked.request.inputs)
-                return asked, submit(self._core, model, asked.request, deadline)
+                return asked, submit(self._core, model, asked.request, deadline, outcome)
 
             small = len(body) <= SMALL_BYTES
             asked, inference = begin() if small else await run_in_threadpool(begin)
         await until_settled(inference.tickets, request)
         if inference.bulky or len(inference.contact_ids) > SMALL_SCAN:
-            return await run_in_threadpool(self._answer, model, asked, inference)
-        return self._answer(model, asked, inference)
+            return await run_in_threadpool(self._answer, model, asked, inference, outcome)
+        return self._answer(model, asked, inference, outcome)
 
     async def _unknown(self, request: Request, _: Outcome) -> Response:
         raise HTTPException(404, f"expected a path of the Open Inference Protocol, got {request.url.path!r:.80}")
 
-    def _answer(self, model: Model, asked: Asked, inference: Inference) -> Response:
-        tensors, stage_ms = inference.conclude(DOOR, self._metrics)
+    def _answer(self, model: Model, asked: Asked, inference: Inference, outcome: Outcome) -> Response:
+        tensors, stage_ms = inference.conclude(DOOR, self._metrics, outcome)
         fields = {"model_name": models.NAME, "model_version": models.version_of(model)}
         content, json_bytes = write_answer(fields, tensors, asked)
-        headers = {"Server-Timing": server_timing(stage_ms)}
+        headers = {"Server-Timing": server_timing(stage_ms), HTTP_HEADER: as_text(self._core.load())}
         if json_bytes is None:
             return Response(content, headers=headers, media_type=JSON)
         return Response(content, headers={**headers, JSON_BYTES_HEADER: str(json_bytes)}, media_type=PACKED)
@@ -139,12 +138,12 @@ def _check_form(request: Request) -> None:
 
 def _refused(error: Exception) -> tuple[FaultKind, Response]:
     """The protocol's error object; beside its sentence what a problem document of the other paths says."""
-    headers: Mapping[str, str] = {}
     if isinstance(error, HTTPException):
         fault, status = Fault(FaultKind.INVALID_INPUT, error.detail), error.status_code
-        headers = error.headers or headers
+        headers: Mapping[str, str] = error.headers or {}
     else:
         fault = fault_of(error)
+        headers = retry_headers(fault)
         status = 404 if isinstance(error, models.UnknownModel) else STATUS[fault.kind]
     body = {
         "error": fault.message,
