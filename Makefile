@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 EDITABLE := $(PIP) install --no-build-isolation --no-deps --no-index
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch lock hooks
+.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch clients lock hooks
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -20,7 +20,7 @@ serve: $(VENV)/.service ## run the service on loopback until Ctrl-C
 
 setup: $(VENV)/.dev ## create .venv with everything but torch
 
-test: $(VENV)/.dev ## run the whole suite, but the training tests only after `make torch`
+test: $(VENV)/.dev $(VENV)/.clients ## run the whole suite, but the training tests only after `make torch`
 	@$(BIN)/python -m pytest -n 2
 
 check: lint types arch gen-check test ## everything a change must pass
@@ -44,8 +44,8 @@ gen: $(VENV)/.dev ## write the gRPC stubs again from proto/
 
 gen-check: $(VENV)/.dev ## the gRPC stubs are those of proto/
 	@fresh=$$(mktemp -d) && trap 'rm -rf "$$fresh"' EXIT && PYTHON=$(BIN)/python sh proto/generate.sh "$$fresh" && \
-	for stub in "$$fresh"/shipshape/v1/*; do \
-	  diff "$$stub" "service/shipshape/v1/$${stub##*/}" || { echo "make gen-check: expected the stubs of proto/, got others: run make gen" >&2; exit 1; }; \
+	for stub in "$$fresh"/shipshape/*/*; do \
+	  diff "$$stub" "service/$${stub#"$$fresh"/}" || { echo "make gen-check: expected the stubs of proto/, got others: run make gen" >&2; exit 1; }; \
 	done
 
 train: torch ## make the default bundle in the lab: data sets, networks, ONNX, manifest
@@ -53,6 +53,8 @@ train: torch ## make the default bundle in the lab: data sets, networks, ONNX, m
 
 torch: $(VENV)/.dev ## add torch, which only the lab and its tests use
 	@$(BIN)/python -c 'import torch' 2>/dev/null || $(PIP) install --requirement requirements/torch.txt
+
+clients: $(VENV)/.clients ## install the clients of other makers that the tests use, apart: they need older packages
 
 hooks: $(VENV)/.dev ## run the quick checks before each of your commits
 	@$(BIN)/pre-commit install
@@ -64,6 +66,7 @@ lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
 	@$(LOCK) pyproject.toml requirements/build.in --output-file requirements/service.lock
 	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest \
 	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
+	@$(LOCK) requirements/clients.in --output-file requirements/clients.lock
 
 # A stamp is older than its lock only when the lock changed: the second time, nothing is asked of the network.
 $(VENV)/.service: requirements/service.lock pyproject.toml | $(BIN)/python
@@ -76,6 +79,13 @@ $(VENV)/.dev: requirements/dev.lock lab/pyproject.toml $(VENV)/.service
 	@echo "installing what requirements/dev.lock pins"
 	@$(PIP) install --require-hashes --requirement requirements/dev.lock
 	@$(EDITABLE) --editable lab
+	@touch $@
+
+$(VENV)/.clients: requirements/clients.lock | $(BIN)/python
+	@echo "installing what requirements/clients.lock pins"
+	@$(BIN)/python -m venv --clear $(VENV)/clients
+	@$(VENV)/clients/bin/python -m pip --disable-pip-version-check --quiet install --no-deps --require-hashes \
+	  --requirement requirements/clients.lock
 	@touch $@
 
 $(BIN)/python:

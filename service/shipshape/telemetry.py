@@ -27,6 +27,8 @@ OK, DEGRADED, CANCELLED, INTERNAL = "ok", "degraded", "cancelled", "internal"
 HELD = (OK, DEGRADED, INTERNAL, "overloaded", "deadline_exceeded", "not_ready")
 SINGLE, SCAN = "recognise", "recognise_scan"  # the methods whose request is one contact, and many
 STREAM = "recognise_stream"  # each of its messages counts as a request of many contacts
+INFER = "infer"  # that of the Open Inference Protocol, whose request may be either
+RECOGNISING = (SINGLE, SCAN, STREAM, INFER)
 
 request_id: ContextVar[str] = ContextVar("request_id", default="")
 _logger = logging.getLogger(__name__)
@@ -142,9 +144,9 @@ class Metrics:
             seconds = time.perf_counter() - start
             in_flight.dec()
             self._request.labels(door, method, outcome.kind).observe(seconds)
-            if method == SINGLE or outcome.kind not in (OK, DEGRADED):
-                self.count_contacts(door, [outcome.kind] * outcome.contacts)
-            if method in (SINGLE, SCAN, STREAM) and outcome.urgent and outcome.kind in HELD:
+            if outcome.contacts and (method == SINGLE or outcome.kind not in (OK, DEGRADED)):
+                self._contacts.labels(door, outcome.kind).inc(outcome.contacts)
+            if method in RECOGNISING and outcome.urgent and outcome.kind in HELD:
                 inside = self.budget.tell(seconds, answered=outcome.kind in (OK, DEGRADED))
                 self._held.labels(str(inside).lower()).inc()
             _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)

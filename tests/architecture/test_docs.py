@@ -7,7 +7,7 @@ import pytest
 from architecture.tree import GENERATED, ROOT, functions, name, sources, tracked
 from shipshape.cli import build_parser
 
-DOCUMENTS = [path for path in tracked("*.md") if GENERATED not in path.parents]
+DOCUMENTS = [path for path in tracked("*.md") if GENERATED.isdisjoint(path.parents)]
 ARCHITECTURE = ROOT / "ARCHITECTURE.md"
 
 

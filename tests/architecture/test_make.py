@@ -9,7 +9,8 @@ import pytest
 from architecture.tree import ROOT
 
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
-INPUTS = ("Makefile", "pyproject.toml", "lab/pyproject.toml", "requirements/service.lock", "requirements/dev.lock")
+LOCKS = ("requirements/service.lock", "requirements/dev.lock", "requirements/clients.lock")
+INPUTS = ("Makefile", "pyproject.toml", "lab/pyproject.toml", *LOCKS)
 EVERYTHING = ("demo", "serve", "setup", "test", "check")
 
 
@@ -24,7 +25,7 @@ def copy(tmp_path):
 
 def installed(folder):
     """The folder after a first `make setup`, as far as make can see: the interpreter, then the stamps."""
-    for age, file in ((20, "bin/python"), (10, ".service"), (0, ".dev")):
+    for age, file in ((20, "bin/python"), (10, ".service"), (0, ".dev"), (0, ".clients")):
         path = folder / ".venv" / file
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()

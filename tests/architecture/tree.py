@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-GENERATED = ROOT / "service/shipshape/v1"
+GENERATED = {ROOT / "service/shipshape/v1", ROOT / "service/shipshape/inference"}
 
 
 def tracked(pattern: str = "*") -> list[Path]:
@@ -19,7 +19,7 @@ def tracked(pattern: str = "*") -> list[Path]:
 
 def sources() -> list[Path]:
     """Hand-written Python files."""
-    return [path for path in tracked("*.py") if GENERATED not in path.parents]
+    return [path for path in tracked("*.py") if GENERATED.isdisjoint(path.parents)]
 
 
 def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:

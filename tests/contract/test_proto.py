@@ -17,7 +17,11 @@ from shipshape.v1 import shipshape_pb2 as pb
 
 ROOT = Path(__file__).parents[2]
 PROTO = ROOT / "proto/shipshape/v1/shipshape.proto"
-STUBS = ("shipshape_pb2.py", "shipshape_pb2.pyi", "shipshape_pb2_grpc.py")
+STUBS = [
+    f"shipshape/{name}{end}"
+    for name in ("v1/shipshape", "inference/open_inference")
+    for end in ("_pb2.py", "_pb2.pyi", "_pb2_grpc.py")
+]
 POINTS = arrays(np.float32, st.tuples(st.integers(0, 50), st.just(3)), elements=st.floats(width=32))
 
 
@@ -25,8 +29,8 @@ def test_the_stubs_are_those_of_the_proto(tmp_path):
     pytest.importorskip("grpc_tools", reason="the stubs can only be compared where grpcio-tools is installed")
     subprocess.run(["sh", ROOT / "proto/generate.sh", tmp_path], check=True, env={"PYTHON": sys.executable})
     for name in STUBS:
-        fresh = (tmp_path / "shipshape/v1" / name).read_text()
-        assert fresh == (ROOT / "service/shipshape/v1" / name).read_text(), f"run proto/generate.sh: {name}"
+        fresh = (tmp_path / name).read_text()
+        assert fresh == (ROOT / "service" / name).read_text(), f"run proto/generate.sh: {name}"
 
 
 @settings(deadline=None)  # a busy machine is no failure

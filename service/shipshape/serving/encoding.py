@@ -168,11 +168,12 @@ def _numbers(rows: list[list[Any]]) -> Float32[np.ndarray, "n 3"]:
     try:
         array = np.asarray(rows, np.float64)
     except OverflowError:  # an integer beyond float64
-        array = np.asarray([[_to_float(number) for number in row] for row in rows], np.float64)
+        array = np.asarray([[to_float(number) for number in row] for row in rows], np.float64)
     return to_float32(array)
 
 
-def _to_float(number: int | float) -> float:
+def to_float(number: int | float) -> float:
+    """A number of JSON, whose integers have no end; beyond float64 they are infinite."""
     try:
         return float(number)
     except OverflowError:

@@ -1,7 +1,9 @@
-"""What every RPC of shipshape.v1 passes: limits, parsing, metrics, request id, and the one table of errors."""
+"""What every RPC of our services passes: limits, parsing, metrics, request id, and the one table of errors."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import grpc
@@ -9,10 +11,12 @@ from google.protobuf.message import DecodeError
 
 from shipshape.errors import InvalidInput
 from shipshape.serving.access import Access
+from shipshape.serving.clients import Share
 from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.serving.grpc.callers import client_of
-from shipshape.telemetry import DEGRADED, SCAN, SINGLE, STREAM, Metrics, new_request_id, request_id
+from shipshape.serving.oip.models import UnknownModel
+from shipshape.telemetry import DEGRADED, SCAN, SINGLE, STREAM, Metrics, Outcome, new_request_id, request_id
 from shipshape.types import Rung
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -27,16 +31,48 @@ STATUS = {
     FaultKind.UNAUTHENTICATED: grpc.StatusCode.UNAUTHENTICATED,
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
-METHODS = {"Recognise": SINGLE, "RecogniseScan": SCAN, "GetModelInfo": "model_info", "GetCapacity": "capacity"}
-PREFIX = "/shipshape.v1.Shipshape/"
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
 StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Iterator[Any]]
 
 
-class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
-    """Wraps the methods of shipshape.v1 and leaves health and reflection alone."""
+@dataclass(frozen=True, slots=True)
+class Guarded:
+    """A service whose RPCs are guarded."""
 
-    def __init__(self, metrics: Metrics, limits: Limits, access: Access) -> None:
+    service: str
+    door: str  # in the metrics
+    methods: Mapping[str, str]  # RPC to its name in the metrics
+
+
+V1 = Guarded(
+    "shipshape.v1.Shipshape",
+    "grpc",
+    {
+        "Recognise": SINGLE,
+        "RecogniseScan": SCAN,
+        "RecogniseStream": STREAM,
+        "GetModelInfo": "model_info",
+        "GetCapacity": "capacity",
+    },
+)
+
+
+@dataclass(slots=True)
+class Call:
+    """The RPC under way, for its servicer."""
+
+    outcome: Outcome  # to write
+    share: Share  # to take from
+
+
+current_call: ContextVar[Call] = ContextVar("call")
+
+
+class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the stubs only
+    """Wraps the methods of one service and leaves all others alone."""
+
+    def __init__(self, guarded: Guarded, metrics: Metrics, limits: Limits, access: Access) -> None:
+        self._of = guarded
         self._metrics = metrics
         self._access = access
         self._limits = limits
@@ -44,15 +80,16 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
     def intercept_service(self, continuation: Any, handler_call_details: Any) -> Any:
         """The method's handler, guarded."""
         handler = continuation(handler_call_details)
-        if handler is None or not handler_call_details.method.startswith(PREFIX):
+        service, _, name = handler_call_details.method.removeprefix("/").partition("/")
+        if handler is None or service != self._of.service:
             return handler
+        method = self._of.methods[name]
         # No deserializer: gRPC would answer INTERNAL to bytes that do not parse, and that is not our fault.
         if handler.request_streaming:
             return grpc.stream_stream_rpc_method_handler(
                 self._guarded_stream(handler.stream_stream, handler.request_deserializer),
                 response_serializer=handler.response_serializer,
             )
-        method = METHODS[handler_call_details.method.removeprefix(PREFIX)]
         return grpc.unary_unary_rpc_method_handler(
             self._guarded(handler.unary_unary, handler.request_deserializer, method),
             response_serializer=handler.response_serializer,
@@ -61,20 +98,22 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
     def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
         def call(raw: bytes, context: grpc.ServicerContext) -> Any:
             identify(context)
-            with self._metrics.request("grpc", method) as outcome:
+            with self._metrics.request(self._of.door, method) as outcome:
                 try:
                     check_body(len(raw), self._limits)
-                    message = _parsed(raw, parse)
+                    message = _parsed(raw, parse, self._of.service)
                     if method == SCAN:
                         outcome.contacts = len(message.contacts)
                     outcome.urgent = method not in (SINGLE, SCAN) or message.options.lane != pb.LANE_BATCH
                     with self._access.clients.share(client_of(context, self._access)) as share:
+                        current_call.set(Call(outcome, share))
                         share.take(min(outcome.contacts, self._limits.max_contacts))
                         response = behaviour(message, context)
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
-                    refuse(context, fault)
+                    unknown = isinstance(error, UnknownModel)
+                    refuse(context, fault, grpc.StatusCode.NOT_FOUND if unknown else None)
                 if method == SINGLE and response.recognition.rung != Rung.FULL:
                     outcome.kind = DEGRADED
                 return response
@@ -87,11 +126,9 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
             set_trailing(context)
             try:
                 yield from behaviour(self._messages(raws, parse), context)
-            except (
-                Exception
-            ) as error:  # what a message alone gets wrong is answered in the stream, and counted there
+            except Exception as error:  # a message that is wrong is answered and counted in the stream
                 fault = fault_of(error)
-                with self._metrics.request("grpc", STREAM) as outcome:
+                with self._metrics.request(self._of.door, STREAM) as outcome:
                     outcome.kind = fault.kind
                 refuse(context, fault)
 
@@ -100,7 +137,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
     def _messages(self, raws: Iterator[bytes], parse: Callable[[bytes], Any]) -> Iterator[Any]:
         for raw in raws:
             check_body(len(raw), self._limits)
-            yield _parsed(raw, parse)
+            yield _parsed(raw, parse, self._of.service)
 
 
 def identify(context: grpc.ServicerContext) -> None:
@@ -115,20 +152,20 @@ def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str | bytes
     context.set_trailing_metadata((*entries, ("x-request-id", request_id.get())))
 
 
-def refuse(context: grpc.ServicerContext, fault: Fault) -> NoReturn:
-    """End the call with the status of `fault`, and tell gRPC's own retries how long to wait."""
+def refuse(context: grpc.ServicerContext, fault: Fault, status: grpc.StatusCode | None = None) -> NoReturn:
+    """End the call with `status`, or that of `fault`, and tell gRPC's own retries how long to wait."""
     entries = [("shipshape-error", str(fault.kind))]
     if fault.retry_after_s is not None:
         entries.append(("grpc-retry-pushback-ms", str(math.ceil(fault.retry_after_s * 1e3))))
     set_trailing(context, *entries)
-    context.abort(STATUS[fault.kind], fault.message)
+    context.abort(status or STATUS[fault.kind], fault.message)
     raise AssertionError("unreachable: abort raises")
 
 
-def _parsed(raw: bytes, parse: Callable[[bytes], Any]) -> Any:
+def _parsed(raw: bytes, parse: Callable[[bytes], Any], service: str) -> Any:
     try:
         return parse(raw)
     except DecodeError as error:
         raise InvalidInput(
-            f"expected a message of shipshape.v1, got {len(raw)} bytes that do not parse as one"
+            f"expected a message of {service.rpartition('.')[0]}, got {len(raw)} bytes that do not parse as one"
         ) from error

@@ -1,4 +1,4 @@
-"""The gRPC door: shipshape.v1, grpc.health.v1 and reflection on one port."""
+"""The gRPC door: shipshape.v1, the Open Inference Protocol, grpc.health.v1 and reflection on one port."""
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -6,18 +6,20 @@ from concurrent.futures import ThreadPoolExecutor
 import grpc
 from grpc_health.v1 import health, health_pb2, health_pb2_grpc
 
+from shipshape.inference.open_inference_pb2_grpc import add_GRPCInferenceServiceServicer_to_server
 from shipshape.serving.access import Access
 from shipshape.serving.core import Core
 from shipshape.serving.grpc.doorkeeper import Doorkeeper, credentials
-from shipshape.serving.grpc.guard import Guard
+from shipshape.serving.grpc.guard import V1, Guard
+from shipshape.serving.grpc.oip_servicer import GUARDED, OipServicer
 from shipshape.serving.grpc.reflection import PLACES, add_reflection
 from shipshape.serving.grpc.servicer import Servicer
 from shipshape.serving.grpc.streams import STREAMS, Streams
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
-from shipshape.v1 import shipshape_pb2, shipshape_pb2_grpc
+from shipshape.v1 import shipshape_pb2_grpc
 
-SERVICE = shipshape_pb2.DESCRIPTOR.services_by_name["Shipshape"].full_name
+SERVICES = (V1.service, GUARDED.service)
 SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and for reflection streams
 MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that the refusal is ours, in one sentence
 
@@ -41,7 +43,10 @@ class GrpcDoor:
         self._health = health.HealthServicer()
         self._server = grpc.server(
             ThreadPoolExecutor(waiting + SPARE_THREADS + STREAMS, thread_name_prefix="grpc"),
-            interceptors=[Doorkeeper(access), Guard(metrics, limits, access)],
+            interceptors=[
+                Doorkeeper(access),
+                *(Guard(guarded, metrics, limits, access) for guarded in (V1, GUARDED)),
+            ],
             options=[
                 ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
                 ("grpc.max_receive_message_length", limits.max_body_bytes + MESSAGE_SLACK),
@@ -51,8 +56,10 @@ class GrpcDoor:
         self._streams = Streams(core, metrics, timeouts, access)
         servicer = Servicer(core, metrics, timeouts, self._streams)
         shipshape_pb2_grpc.add_ShipshapeServicer_to_server(servicer, self._server)  # type: ignore[no-untyped-call]
+        oip = OipServicer(core, metrics, timeouts)
+        add_GRPCInferenceServiceServicer_to_server(oip, self._server)  # type: ignore[no-untyped-call]
         health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
-        add_reflection((SERVICE, health.SERVICE_NAME), self._server)
+        add_reflection((*SERVICES, health.SERVICE_NAME), self._server)
         self.close()
 
     def start(self, host: str, port: int) -> int:
@@ -89,7 +96,7 @@ class GrpcDoor:
         return self._server.stop(drain_s)
 
     def _set(self, status: int) -> None:
-        for service in ("", SERVICE):
+        for service in ("", *SERVICES):
             self._health.set(service, status)
 
 

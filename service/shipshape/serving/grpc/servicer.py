@@ -36,10 +36,10 @@ class Servicer(pb_grpc.ShipshapeServicer):
         model = self._core.model()
         wishes = convert.to_wishes(request.options)
         contact = convert.to_contact(request.contact, self._core.limits)
-        ticket = self._core.submit(model, contact, wishes, self._deadline(context))
-        _cancel_with(context, [ticket])
+        ticket = self._core.submit(model, contact, wishes, deadline_of(self._core, self._timeouts, context))
+        cancel_with(context, [ticket])
         answer = ticket.result()
-        _set_timing(context, answer.recognition.stage_ms, self._core.load())
+        set_timing(context, answer.recognition.stage_ms, self._core.load())
         return pb.RecogniseResponse(recognition=convert.from_answer(answer, wishes))
 
     def RecogniseScan(
@@ -50,10 +50,10 @@ class Servicer(pb_grpc.ShipshapeServicer):
         wishes = convert.to_wishes(request.options)
         check_contacts(len(request.contacts), self._core.limits)
         contacts = convert.to_contacts(request.contacts, self._core.limits)
-        scan = self._core.submit_scan(model, contacts, wishes, self._deadline(context))
-        _cancel_with(context, scan.tickets)
+        scan = self._core.submit_scan(model, contacts, wishes, deadline_of(self._core, self._timeouts, context))
+        cancel_with(context, scan.tickets)
         outcomes, stage_ms = conclude(scan, "grpc", self._metrics)
-        _set_timing(context, stage_ms, self._core.load())
+        set_timing(context, stage_ms, self._core.load())
         return convert.from_outcomes((contact.contact_id for contact in request.contacts), outcomes, wishes)
 
     def RecogniseStream(
@@ -83,14 +83,16 @@ class Servicer(pb_grpc.ShipshapeServicer):
         set_trailing(context)
         return convert.from_capacity(capacity, self._metrics.budget.report())
 
-    def _deadline(self, context: grpc.ServicerContext) -> float:
-        remaining = context.time_remaining()
-        if remaining is None or remaining > NEVER_S:
-            remaining = self._timeouts.default_ms / 1e3
-        return self._core.deadline_in(min(remaining, LONGEST_MS / 1e3))
+
+def deadline_of(core: Core, timeouts: Timeouts, context: grpc.ServicerContext) -> float:
+    """The caller's deadline, or the default one, on the executor's clock."""
+    remaining = context.time_remaining()
+    if remaining is None or remaining > NEVER_S:
+        remaining = timeouts.default_ms / 1e3
+    return core.deadline_in(min(remaining, LONGEST_MS / 1e3))
 
 
-def _cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -> None:
+def cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -> None:
     """Drop the work when the RPC ends before it."""
 
     def cancel() -> None:
@@ -101,5 +103,6 @@ def _cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) 
         cancel()
 
 
-def _set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float], load: float) -> None:
+def set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float], load: float) -> None:
+    """Trailing metadata: the milliseconds of each stage, the load and the request's id."""
     set_trailing(context, ("server-timing", server_timing(stage_ms)), (GRPC_TRAILER, as_message(load)))

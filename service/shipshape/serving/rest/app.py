@@ -12,8 +12,10 @@ from shipshape.serving.access import Access
 from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.rest import contract
+from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.doorkeeper import Doorkeeper
 from shipshape.serving.rest.json_process import JsonProcess
+from shipshape.serving.rest.oip_routes import OipRoutes
 from shipshape.serving.rest.problems import add_handlers
 from shipshape.serving.rest.routes import Routes
 from shipshape.serving.rest.schemas import CapacityAnswer, ModelAnswer, RecognitionAnswer, ScanAnswer
@@ -39,7 +41,8 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access) 
         redoc_url=None,
         lifespan=lambda _: _until_the_listener_ends(json),
     )
-    routes = Routes(core, metrics, timeouts, access.clients, json)
+    bodies = Bodies(core.limits)
+    routes = Routes(core, metrics, timeouts, access.clients, bodies, json)
     refusals = contract.problems(*(kind for kind in FaultKind if kind is not FaultKind.CANCELLED))
     not_ready = contract.problems(FaultKind.NOT_READY)
     stranger = contract.problems(FaultKind.UNAUTHENTICATED)
@@ -56,6 +59,7 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access) 
     add("/livez", routes.live, "GET")
     add("/readyz", routes.ready, "GET", responses=not_ready)
     add("/metrics", routes.metrics, "GET", response_class=PlainTextResponse, responses=stranger)
+    app.router.routes.extend(OipRoutes(core, metrics, timeouts, access.clients, bodies).routes())
     add_handlers(app)
     contract.add_contract(app)
     app.add_middleware(Doorkeeper, access=access)

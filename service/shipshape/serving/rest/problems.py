@@ -38,12 +38,18 @@ def problem(fault: Fault) -> Response:
     """The problem document of a fault."""
     title = fault.kind.replace("_", " ").capitalize()
     response = _document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
-    if fault.retry_after_s is not None:
-        response.headers["Retry-After"] = str(max(1, math.ceil(fault.retry_after_s)))  # whole seconds, by its RFC
-        response.headers[RETRY_HEADER] = str(math.ceil(fault.retry_after_s * 1e3))
+    response.headers.update(retry_headers(fault))
     if fault.kind is FaultKind.UNAUTHENTICATED:
         response.headers["WWW-Authenticate"] = "Bearer"
     return response
+
+
+def retry_headers(fault: Fault) -> dict[str, str]:
+    """When callers who were refused shall come back, if the fault says it."""
+    if fault.retry_after_s is None:
+        return {}
+    whole = max(1, math.ceil(fault.retry_after_s))  # seconds, by its RFC
+    return {"Retry-After": str(whole), RETRY_HEADER: str(math.ceil(fault.retry_after_s * 1e3))}
 
 
 def add_handlers(app: FastAPI) -> None:

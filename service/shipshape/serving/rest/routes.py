@@ -39,17 +39,24 @@ class Routes:
         metrics: Told of every request.
         timeouts: Deadline of requests that set none.
         clients: Hold each to its share.
+        bodies: Bounds all bodies that are being read.
         json: Parses large JSON.
     """
 
     def __init__(
-        self, core: Core, metrics: Metrics, timeouts: Timeouts, clients: Clients, json: JsonProcess
+        self,
+        core: Core,
+        metrics: Metrics,
+        timeouts: Timeouts,
+        clients: Clients,
+        bodies: Bodies,
+        json: JsonProcess,
     ) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
         self._clients = clients
-        self._bodies = Bodies(core.limits)
+        self._bodies = bodies
         self._json = json
 
     async def recognise(self, request: Request) -> Response:
