@@ -130,10 +130,19 @@ def test_a_service_that_leaves_is_unavailable_and_one_that_starts_cannot_be_test
         run(asked(both(doors)[door]))
 
 
+def scan(error):
+    """The answer to two contacts: one on the top rung, one with an error if there is any."""
+    outputs = {"rung": ["full", "" if error else "full"], "error": ["", error], "detail": ["", "expected"]}
+    return json.dumps({"outputs": [{"name": name, "data": data} for name, data in outputs.items()]}).encode()
+
+
 ANSWERS = {
     "ok": (200, b'{"outputs":[{"name":"vessel","data":["tug"]}]}', Outcome.OK),
     "full": (200, b'{"outputs":[{"name":"rung","data":["full"]}]}', Outcome.OK),
     "degraded": (200, b'{"outputs":[{"name":"rung","data":["full","heading"]}]}', Outcome.DEGRADED),
+    "scan": (200, scan(""), Outcome.OK),
+    "late contact": (200, scan("deadline_exceeded"), Outcome.EXPIRED),
+    "bad contact": (200, scan("unprocessable"), Outcome.ERROR),
     "refused": (429, b'{"error":"come back later"}', Outcome.REFUSED),
     "unavailable": (503, b"", Outcome.UNAVAILABLE),
     "expired": (504, b"gateway", Outcome.EXPIRED),

@@ -14,6 +14,11 @@ TIMEOUT_HEADER = "Shipshape-Timeout-Ms"
 GRACE_S = (
     1.0  # after the deadline in which a target may still say that it is late, so that the connection lives on
 )
+CONTACT_OUTCOMES = {
+    "overloaded": Outcome.REFUSED,
+    "deadline_exceeded": Outcome.EXPIRED,
+    "not_ready": Outcome.UNAVAILABLE,
+}
 OUTCOMES = {429: Outcome.REFUSED, 503: Outcome.UNAVAILABLE, 504: Outcome.EXPIRED}
 JSON = "application/json"
 Read = Callable[[Any], Reply]  # an answer's JSON -> how it counts
@@ -65,6 +70,11 @@ class HttpClient:
     async def close(self) -> None:
         """Close all connections."""
         await self._session.close()
+
+
+def of_contact_error(kind: str, detail: str) -> Reply:
+    """How a contact counts that got none of its scan's answers, by Shipshape's name for the reason."""
+    return Reply(CONTACT_OUTCOMES.get(kind, Outcome.ERROR), f"{kind}: {detail}")
 
 
 def _words(body: bytes) -> str:

@@ -1,7 +1,8 @@
 """The Open Inference Protocol v2 over HTTP, in JSON: any server that takes ragged clusters as two tensors.
 
 Inputs: `points` FP32 [n, 3], the points of all contacts one after the other; `counts` INT32 [contacts], how many
-each has. An output `rung`, where there is one, tells full answers from degraded ones.
+each has. Of the outputs, where they are there: `rung` tells full answers from degraded ones; `error` names why a contact
+got none, and `detail` says it in words.
 """
 
 from typing import Any
@@ -11,9 +12,9 @@ import orjson
 
 from shipshape.errors import SettingsError
 from shipshape.loadtest.mixture import Request
-from shipshape.loadtest.outcomes import Reply, answered_on
+from shipshape.loadtest.outcomes import Reply, answered_on, worst
 from shipshape.loadtest.targets.address import Address
-from shipshape.loadtest.targets.http import JSON, HttpClient
+from shipshape.loadtest.targets.http import JSON, HttpClient, of_contact_error
 from shipshape.loadtest.targets.target import TargetError, TargetInfo
 
 
@@ -57,6 +58,8 @@ class OipTarget:
 
 
 def _of_answer(answer: dict[str, Any]) -> Reply:
-    return answered_on(
-        [rung for output in answer["outputs"] if output["name"] == "rung" for rung in output["data"]]
-    )
+    outputs = {output["name"]: output["data"] for output in answer["outputs"]}
+    errors = outputs.get("error", [])
+    details = outputs.get("detail", [""] * len(errors))
+    failed = [of_contact_error(kind, detail) for kind, detail in zip(errors, details, strict=True) if kind]
+    return worst(failed) if failed else answered_on(outputs.get("rung", []))

@@ -6,17 +6,12 @@ from typing import Any, NamedTuple
 import orjson
 
 from shipshape.loadtest.mixture import Request
-from shipshape.loadtest.outcomes import Outcome, Reply, answered_on, worst
+from shipshape.loadtest.outcomes import Reply, answered_on, worst
 from shipshape.loadtest.targets.address import Address
-from shipshape.loadtest.targets.http import JSON, HttpClient
+from shipshape.loadtest.targets.http import JSON, HttpClient, of_contact_error
 from shipshape.loadtest.targets.target import TargetError, TargetInfo
 
 PACKED = "application/octet-stream"
-CONTACT_OUTCOMES = {
-    "overloaded": Outcome.REFUSED,
-    "deadline_exceeded": Outcome.EXPIRED,
-    "not_ready": Outcome.UNAVAILABLE,
-}
 
 
 class RestPayload(NamedTuple):
@@ -78,5 +73,4 @@ def _of_scan(answer: dict[str, Any]) -> Reply:
 def _of_result(result: dict[str, Any]) -> Reply:
     if (found := result.get("recognition")) is not None:
         return _of_contact(found)
-    error = result["error"]
-    return Reply(CONTACT_OUTCOMES.get(error["error"], Outcome.ERROR), f"{error['error']}: {error['detail']}")
+    return of_contact_error(result["error"]["error"], result["error"]["detail"])
