@@ -1,8 +1,8 @@
 """The Open Inference Protocol v2 over HTTP, in JSON: any server that takes ragged clusters as two tensors.
 
 Inputs: `points` FP32 [n, 3], the points of all contacts one after the other; `counts` INT32 [contacts], how many
-each has. Of the outputs, where they are there: `rung` tells full answers from degraded ones; `error` names why a contact
-got none, and `detail` says it in words.
+each has. Of the outputs, where they are there: `rung` tells full answers from degraded ones; `error` names why a
+contact got none, and `detail` says it in words.
 """
 
 from typing import Any

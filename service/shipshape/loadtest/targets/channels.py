@@ -1,0 +1,104 @@
+"""Connections to shipshape.v1 over gRPC, and what its messages have in common."""
+
+import grpc
+
+from shipshape.errors import FileError
+from shipshape.loadtest.mixture import Request
+from shipshape.loadtest.outcomes import Outcome, Reply, answered_on
+from shipshape.loadtest.targets.address import Address, Keys
+from shipshape.loadtest.targets.target import CONNECT_S, TargetError, TargetInfo
+from shipshape.v1 import shipshape_pb2 as pb
+from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
+
+SERVICE = "/shipshape.v1.Shipshape/"
+OUTCOMES = {
+    grpc.StatusCode.RESOURCE_EXHAUSTED: Outcome.REFUSED,
+    grpc.StatusCode.DEADLINE_EXCEEDED: Outcome.EXPIRED,
+    grpc.StatusCode.UNAVAILABLE: Outcome.UNAVAILABLE,
+}
+CONTACT_OUTCOMES = {
+    pb.ERROR_KIND_OVERLOADED: Outcome.REFUSED,
+    pb.ERROR_KIND_DEADLINE_EXCEEDED: Outcome.EXPIRED,
+    pb.ERROR_KIND_NOT_READY: Outcome.UNAVAILABLE,
+}
+
+
+class Channels:
+    """Several connections to one address."""
+
+    def __init__(self, address: Address) -> None:
+        self._address = address
+        token = address.keys.token
+        self.metadata = [("authorization", f"Bearer {token}")] if token else []
+        self.all: list[grpc.aio.Channel] = []
+
+    async def open(self) -> TargetInfo:
+        """Connect them all; raises TargetError when nobody answers, or in another protocol."""
+        self.all = [_channel(self._address) for _ in range(self._address.connections)]
+        try:
+            # The first byte on each connection: what is timed later meets none that is still being opened.
+            infos = [await self._model_info(channel) for channel in self.all]
+        except grpc.aio.AioRpcError as error:
+            await self.close()
+            where = f"{self._address.scheme}://{self._address.host}"
+            raise TargetError(
+                f"expected shipshape.v1 at {where}, got {error.code().name}: {error.details()}"
+            ) from error
+        info = infos[0]
+        return TargetInfo(info.version, info.bundle_name, info.bundle, info.limits.budget_ms)
+
+    async def close(self) -> None:
+        """Disconnect."""
+        for channel in self.all:
+            await channel.close(None)
+
+    async def _model_info(self, channel: grpc.aio.Channel) -> pb.GetModelInfoResponse:
+        ask = ShipshapeStub(channel).GetModelInfo  # type: ignore[no-untyped-call]
+        info: pb.GetModelInfoResponse = await ask(
+            pb.GetModelInfoRequest(), timeout=CONNECT_S, metadata=self.metadata
+        )
+        return info
+
+
+def contacts_of(request: Request) -> list[pb.Contact]:
+    """The contacts of a request."""
+    return [pb.Contact(points=cluster.astype("<f4").tobytes()) for cluster in request.clusters]
+
+
+def options_of(request: Request) -> pb.Options | None:
+    """The options of a request; None: the service's defaults."""
+    return pb.Options(lane=f"LANE_{request.lane.upper()}") if request.lane else None
+
+
+def of_failure(error: grpc.aio.AioRpcError) -> Reply:
+    """How a call counts that ended with a status."""
+    return Reply(OUTCOMES.get(error.code(), Outcome.ERROR), f"{error.code().name}: {error.details()}")
+
+
+def of_contact(result: pb.ContactResult) -> Reply:
+    """How one contact of a scan counts."""
+    return of_error(result.error) if result.HasField("error") else answered_on([result.recognition.rung])
+
+
+def of_error(error: pb.ContactError) -> Reply:
+    """How a contact counts that got no answer."""
+    kind = pb.ErrorKind.Name(error.kind)
+    return Reply(CONTACT_OUTCOMES.get(error.kind, Outcome.ERROR), f"{kind}: {error.message}")
+
+
+def _channel(address: Address) -> grpc.aio.Channel:
+    # Channels to one address share one connection unless they are told not to.
+    options = [("grpc.use_local_subchannel_pool", 1), ("grpc.enable_http_proxy", 0)]
+    if address.secure:
+        return grpc.aio.secure_channel(address.host, _credentials(address.keys), options)
+    return grpc.aio.insecure_channel(address.host, options)
+
+
+def _credentials(keys: Keys) -> grpc.ChannelCredentials:
+    try:
+        ca, certificate, key = (
+            None if path is None else path.read_bytes() for path in (keys.ca, keys.certificate, keys.key)
+        )
+    except OSError as error:
+        raise FileError(f"expected PEM files for TLS, got: {error}") from error
+    return grpc.ssl_channel_credentials(ca, key, certificate)
