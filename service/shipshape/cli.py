@@ -44,7 +44,8 @@ examples:
   shipshape loadtest oip+http://127.0.0.1:8080/shipshape --points 50=2,300=8,2000
 
 targets:
-  grpc[s]://HOST:PORT             shipshape.v1
+  grpc[s]://HOST:PORT             shipshape.v1, a call a request
+  grpc[s]+stream://HOST:PORT      shipshape.v1, a message of RecogniseStream a request
   http[s]://HOST:PORT             REST
   oip+http[s]://HOST:PORT/MODEL   Open Inference Protocol v2: any server that takes `points` and `counts`
 

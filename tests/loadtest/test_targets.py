@@ -22,6 +22,7 @@ from shipshape.loadtest.targets.target import TargetError
 from shipshape.v1 import shipshape_pb2 as pb
 
 PATIENCE_S = 10.0
+DOORS = ("grpc", "stream", "rest")
 ONE, THREE = Request((cluster(),)), Request((cluster(40), cluster(60), cluster(10)))
 
 
@@ -36,7 +37,12 @@ def address(url, **keys):
 
 def both(doors):
     ports = doors.addresses
-    return {"grpc": f"grpc://127.0.0.1:{ports.grpc_port}", "rest": f"http://127.0.0.1:{ports.rest_port}"}
+    host = f"127.0.0.1:{ports.grpc_port}"
+    return {
+        "grpc": f"grpc://{host}",
+        "stream": f"grpc+stream://{host}",
+        "rest": f"http://127.0.0.1:{ports.rest_port}",
+    }
 
 
 @asynccontextmanager
@@ -54,7 +60,7 @@ async def asked(url, *requests, deadline_s=PATIENCE_S):
         return await asyncio.gather(*(target.send(target.encode(each), deadline_s) for each in requests))
 
 
-@pytest.mark.parametrize("door", ["grpc", "rest"])
+@pytest.mark.parametrize("door", DOORS)
 def test_what_the_service_says_of_itself(doors, door):
     async def described():
         async with opened(both(doors)[door]) as (_, info):
@@ -65,7 +71,7 @@ def test_what_the_service_says_of_itself(doors, door):
     assert info.version
 
 
-@pytest.mark.parametrize("door", ["grpc", "rest"])
+@pytest.mark.parametrize("door", DOORS)
 def test_single_contacts_and_scans_are_answered(doors, door):
     doors.pipeline.computed.clear()
     replies = run(asked(both(doors)[door], ONE, THREE, ONE))
@@ -85,7 +91,7 @@ def test_lanes_go_along(doors, clusters):
     assert path == "/v1/recognise?lane=batch" if len(clusters) == 1 else json.loads(body)["lane"] == "batch"
 
 
-@pytest.mark.parametrize("door", ["grpc", "rest"])
+@pytest.mark.parametrize("door", DOORS)
 @pytest.mark.parametrize("bad", [Request((CLUSTER[:1],)), Request((cluster(), CLUSTER[:1]))], ids=["one", "scan"])
 def test_a_contact_that_is_refused_for_good_is_an_error_with_its_words(doors, door, bad):
     (reply,) = run(asked(both(doors)[door], bad))
@@ -93,7 +99,7 @@ def test_a_contact_that_is_refused_for_good_is_an_error_with_its_words(doors, do
     assert "expected" in reply.detail
 
 
-@pytest.mark.parametrize("door", ["grpc", "rest"])
+@pytest.mark.parametrize("door", DOORS)
 def test_a_full_queue_refuses_and_a_deadline_expires(door):
     with running(queue_limit=2, max_contacts=2) as doors:
         held = doors.stub.Recognise.future(request(cluster(), contact_id="hold"), timeout=PATIENCE_S)
@@ -117,7 +123,7 @@ def test_a_full_queue_refuses_and_a_deadline_expires(door):
     assert waited.outcome is Outcome.OK
 
 
-@pytest.mark.parametrize("door", ["grpc", "rest"])
+@pytest.mark.parametrize("door", DOORS)
 def test_a_service_that_leaves_is_unavailable_and_one_that_starts_cannot_be_tested(door):
     async def left(doors):
         async with opened(both(doors)[door]) as (target, _):
@@ -253,6 +259,18 @@ def test_keys_that_cannot_be_read_are_refused(tmp_path):
     (tmp_path / "token").write_text("abc\n")
     assert read_token(tmp_path / "token") == "abc"
     assert read_token(None) == ""
+
+
+def test_a_stream_that_breaks_is_opened_again():
+    async def twice(doors):
+        async with opened(both(doors)["stream"]) as (target, _):
+            first = await target.send(target.encode(ONE), PATIENCE_S)
+            for stream in target._streams:
+                stream.end()
+            return first, *await asyncio.gather(*(target.send(target.encode(ONE), PATIENCE_S) for _ in range(4)))
+
+    with running() as doors:
+        assert [reply.outcome for reply in run(twice(doors))] == [Outcome.OK] * 5
 
 
 def test_problem_documents_are_quoted(doors):
