@@ -64,10 +64,11 @@ class Pipeline:
         self._names = [vessel.name for vessel in bundle.catalogue]
         self._common = bundle.parameters["common"]
         self._thresholds = bundle.parameters.get("reasons", {})
-        self.stages = self._stages(lambda work: methods[work.options.preset])
+        radius = self._common["spd2_radius"]
+        self.stages = _stages(lambda work: methods[work.options.preset], radius)
         self._ladders = {
-            Preset.PAPER: (RungStages(Rung.FULL, self._stages(lambda work: paper)),),
-            Preset.BEST: _ladder(best, self._stages(lambda work: best)),
+            Preset.PAPER: (RungStages(Rung.FULL, _stages(lambda work: paper, radius)),),
+            Preset.BEST: _ladder(best, _stages(lambda work: best, radius)),
         }
 
     def run(self, contact: Contact, options: Options | None = None) -> Recognition:
@@ -136,29 +137,33 @@ class Pipeline:
             stage_ms=dict(stage_ms),
         )
 
-    def _stages(self, method: Callable[[Work], Method]) -> tuple[Stage, ...]:
-        return (
-            Stage("prior", lambda work: method(work).prior(work)),
-            Stage("heading", lambda work: method(work).heading(work)),
-            Stage("bow_stern", lambda work: method(work).bow_stern(work)),
-            Stage("projection", lambda work: method(work).projection(work)),
-            Stage("inpainting", lambda work: method(work).inpainting(work)),
-            Stage("lifting", lambda work: method(work).lifting(work)),
-            Stage("keypoints", self._keypoints),
-            Stage("spd2", self._spd2),
-            Stage("classification", lambda work: method(work).classification(work)),
-        )
-
     def _is_unknown(self, work: Work) -> bool:
         *known, unknown = work.probabilities
         return bool(unknown > min(max(known), self._common["unknown_above"]))
 
-    def _keypoints(self, work: Work) -> None:
-        work.points_vessel = work.pose.to_vessel(work.restored.points_level)
-        work.keypoints_vessel = keypoints.select_keypoints(work.points_vessel, KeypointParams())
 
-    def _spd2(self, work: Work) -> None:
-        work.images = spd2.describe(work.points_vessel, work.keypoints_vessel, self._common["spd2_radius"])
+def _stages(method: Callable[[Work], Method], spd2_radius: float) -> tuple[Stage, ...]:
+    """They do not hold the pipeline: a circle would keep a bundle that was swapped out until the next collection."""
+    return (
+        Stage("prior", lambda work: method(work).prior(work)),
+        Stage("heading", lambda work: method(work).heading(work)),
+        Stage("bow_stern", lambda work: method(work).bow_stern(work)),
+        Stage("projection", lambda work: method(work).projection(work)),
+        Stage("inpainting", lambda work: method(work).inpainting(work)),
+        Stage("lifting", lambda work: method(work).lifting(work)),
+        Stage("keypoints", _keypoints),
+        Stage("spd2", lambda work: _spd2(work, spd2_radius)),
+        Stage("classification", lambda work: method(work).classification(work)),
+    )
+
+
+def _keypoints(work: Work) -> None:
+    work.points_vessel = work.pose.to_vessel(work.restored.points_level)
+    work.keypoints_vessel = keypoints.select_keypoints(work.points_vessel, KeypointParams())
+
+
+def _spd2(work: Work, radius: float) -> None:
+    work.images = spd2.describe(work.points_vessel, work.keypoints_vessel, radius)
 
 
 def _ladder(best: BestMethod, full: tuple[Stage, ...]) -> tuple[RungStages, ...]:
