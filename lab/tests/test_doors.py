@@ -47,15 +47,19 @@ class Doors:
     stub: ShipshapeStub
 
 
+def _load(folder):
+    bundle = load_bundle(folder)
+    return Model(bundle, Pipeline(bundle))
+
+
 @pytest.fixture(scope="module")
 def doors():
-    bundle = load_bundle(ROOT / "models")
     settings = Settings(rest_port=0, grpc_port=0, workers=1, default_timeout_ms=PATIENCE * 1e3)
-    service = Service(settings, render_png, on_death=lambda: pytest.fail("a door died"))
+    service = Service(settings, render_png, load=_load, on_death=lambda: pytest.fail("a door died"))
     with ExitStack() as stack:
         stack.callback(service.stop)
         addresses = service.start()
-        service.open(Model(bundle, Pipeline(bundle)))
+        service.open(_load(ROOT / "models"))
         url = f"http://127.0.0.1:{addresses.rest_port}"
         rest = stack.enter_context(httpx.Client(base_url=url, timeout=PATIENCE, trust_env=False))
         channel = stack.enter_context(grpc.insecure_channel(f"127.0.0.1:{addresses.grpc_port}"))

@@ -1,4 +1,4 @@
-"""The command line: shipshape serve | classify FILE... | check | bundle verify DIR | loadtest TARGET | token NAME.
+"""The command line: shipshape serve | classify | check | bundle verify | loadtest | token | admin.
 
 Exit codes: 0 all went well; 1 a cluster or file was refused, or the service failed; 2 the command, a setting
 or the bundle is wrong. Of loadtest: 0 the budget was held; 1 it was not; 2 as above, or no target; 3 the tool was
@@ -89,6 +89,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_bundle(commands)
     _add_loadtest(commands)
     _add_token(commands)
+    _add_admin(commands)
     return parser
 
 
@@ -210,6 +211,27 @@ def _add_token(commands: _Commands) -> None:
     parser = _add(commands, "token", "make a bearer token, and its line for SHIPSHAPE_TOKENS_FILE", notes)
     parser.set_defaults(command="token")
     parser.add_argument("name", metavar="NAME", help="of the client that will hold it")
+
+
+def _add_admin(commands: _Commands) -> None:
+    notes = "example:\n  shipshape admin swap models-2 --token-file admin.token"
+    admin = _add(commands, "admin", "look after a running service through its admin door", notes)
+    calls = admin.add_subparsers(metavar="CALL", required=True)
+    for call, summary in {
+        "status": "print its state, its bundles and its counts",
+        "swap": "try another bundle out and let it answer",
+        "rollback": "let the bundle before the running one answer again",
+        "drain": "not ready any more, still answering",
+        "resume": "ready again",
+    }.items():
+        parser = _add(calls, call, summary, f"example:\n  shipshape admin {call}")
+        parser.set_defaults(command="admin", call=call)
+        parser.add_argument("--url", default="http://127.0.0.1:9090", help="default: %(default)s")
+        parser.add_argument(
+            "--token-file", type=Path, default=Path("admin.token"), help="holds the token (default: %(default)s)"
+        )
+        if call == "swap":
+            parser.add_argument("folder", type=Path, metavar="DIR", help="below the service's bundle_root")
 
 
 def _add_bundle_option(parser: argparse.ArgumentParser) -> None:

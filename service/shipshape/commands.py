@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import orjson
 
+from shipshape.admin_calls import admin
 from shipshape.bundle import Bundle, load_bundle
 from shipshape.classify import (
     Answered,
@@ -116,6 +117,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "bundle verify": verify,
     "loadtest": loadtest,
     "token": token,
+    "admin": admin,
 }
 
 

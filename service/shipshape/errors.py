@@ -9,6 +9,7 @@ ShipshapeError
 |-- Cancelled             executor -> stages: the caller left
 |-- NotReady              the service is starting or stopping
 |-- Unauthenticated       caller -> service: a token that is asked for is missing or unknown
+|-- Conflict              operator -> service: the call does not fit the state it is in
 |-- BundleError           files -> models: the bundle is missing, damaged or of another shape
 |-- FileError             file -> clusters: the file cannot be read
 `-- SettingsError         environment or command line -> settings: unknown, or a value that cannot work
@@ -55,6 +56,10 @@ class NotReady(ShipshapeError):
 
 class Unauthenticated(ShipshapeError):
     """The caller has not shown who it is."""
+
+
+class Conflict(ShipshapeError):
+    """An operator's call does not fit the state that the service is in."""
 
 
 class BundleError(ShipshapeError):

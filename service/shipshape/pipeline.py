@@ -143,7 +143,7 @@ class Pipeline:
 
 
 def _stages(method: Callable[[Work], Method], spd2_radius: float) -> tuple[Stage, ...]:
-    """They do not hold the pipeline: a circle would keep a bundle that was swapped out until the next collection."""
+    """They do not hold the pipeline: a circle would keep a swapped-out bundle until the next collection."""
     return (
         Stage("prior", lambda work: method(work).prior(work)),
         Stage("heading", lambda work: method(work).heading(work)),

@@ -67,6 +67,42 @@ class Settings(BaseSettings):
         description="Seconds that requests under way may still take after SIGTERM. Must be shorter than the "
         "grace of whatever sends the signal.",
     )
+    linger_s: float = Field(
+        0.0,
+        ge=0,
+        le=3600,
+        description="Seconds that a service which was told to stop is not ready but still takes requests, until "
+        "whatever spreads them has noticed; a second signal ends it. 0: aboard nothing spreads them, and each "
+        "second would only put off the restart. Kubernetes and balancers need about 5.",
+    )
+    health_port: int | None = Field(
+        None,
+        ge=0,
+        le=65535,
+        description="TCP port that serves /startedz, /livez, /readyz and /metrics alone, always in plain HTTP, "
+        "for probes that speak neither TLS nor tokens; 0 picks a free one. Absent: none.",
+    )
+    health_host: str = Field("127.0.0.1", description="Address the health port listens on.")
+    admin_port: int | None = Field(
+        None,
+        ge=0,
+        le=65535,
+        description="TCP port of the admin door, which changes the bundle and drains; 0 picks a free one. "
+        "Absent: none. It needs admin_token_file.",
+    )
+    admin_host: str = Field(
+        "127.0.0.1",
+        description="Address the admin door listens on, in plain HTTP: leave it on loopback, ssh can carry it.",
+    )
+    admin_token_file: Path | None = Field(
+        None,
+        description="File of lines NAME SHA256HEX: who may call the admin door. It holds no token.",
+    )
+    bundle_root: Path | None = Field(
+        None,
+        description="The admin door takes bundles from folders below this one alone. Absent: the folder that "
+        "holds `bundle`.",
+    )
     max_body_bytes: int = Field(
         16 * 2**20,
         ge=1024,
@@ -138,6 +174,12 @@ class Settings(BaseSettings):
                     f"expected {PREFIX}{name} to hold a whole scan, {PREFIX}MAX_CONTACTS = {self.max_contacts}, "
                     f"got {limit}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _the_admin_door_has_a_token(self) -> "Settings":
+        if self.admin_port is not None and self.admin_token_file is None:
+            raise ValueError(f"expected {PREFIX}ADMIN_TOKEN_FILE beside {PREFIX}ADMIN_PORT, got none")
         return self
 
     @model_validator(mode="after")

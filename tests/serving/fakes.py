@@ -169,8 +169,8 @@ def image_methods():
 
 
 @contextmanager
-def running(*, opened=True, **settings):
-    """A service around a fresh fake pipeline on free ports."""
+def running(*, opened=True, load=None, **settings):
+    """A service around a fresh fake pipeline on free ports; `load` reads bundles for a swap."""
     pipeline = FakePipeline()
     settings = {
         "rest_port": 0,
@@ -183,6 +183,7 @@ def running(*, opened=True, **settings):
     service = Service(
         Settings(**settings),
         lambda contact, recognition: PNG,
+        load=load,
         on_death=lambda: pytest.fail("a door died"),
     )
     addresses = service.start()

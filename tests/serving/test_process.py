@@ -3,13 +3,9 @@
 import hashlib
 import json
 import math
-import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import grpc
 import httpx
@@ -17,22 +13,10 @@ import numpy as np
 import pytest
 
 from serving.fakes import PATIENCE, cluster, request, rows
+from serving.processes import MODELS, SERVE_FAKES, START_PATIENCE, TESTS, start, stopped_by, until_ready
 from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
 
-TESTS = Path(__file__).parents[1]
-MODELS = TESTS.parent / "models"
 CONTACTS = TESTS.parent / "examples/contacts.npz"
-SERVE_FAKES = """
-import sys
-from serving.fakes import FAKE_BUNDLE, PNG, FakePipeline
-from shipshape.serving import life
-from shipshape.settings import load_settings
-life.load_bundle = lambda path: FAKE_BUNDLE
-life.Pipeline = lambda bundle, limits: FakePipeline()
-life.render_png = lambda contact, recognition: PNG
-sys.exit(life.serve(load_settings()))
-"""
-START_PATIENCE = 60.0
 needs_models = pytest.mark.skipif(
     not (MODELS / "manifest.toml").is_file(), reason="models/ has no manifest.toml yet"
 )
@@ -58,27 +42,6 @@ def cut_short_and_signed(network):
 
 def take_away(network):
     network.unlink()
-
-
-def start(*command, **variables):
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("SHIPSHAPE_")}
-    environment |= {"SHIPSHAPE_REST_PORT": "0", "SHIPSHAPE_GRPC_PORT": "0", "PYTHONPATH": str(TESTS), **variables}
-    return subprocess.Popen([sys.executable, *command], env=environment, stderr=subprocess.PIPE, text=True)
-
-
-def until_ready(process):
-    """The ports of the line that says so."""
-    for line in process.stderr:
-        message = json.loads(line)["message"]
-        if match := re.match(r"ready: REST http://127.0.0.1:(\d+), gRPC 127.0.0.1:(\d+)", message):
-            return int(match[1]), int(match[2])
-    pytest.fail(f"it ended with {process.wait(PATIENCE)} before it was ready")
-
-
-def stopped_by(process, number):
-    process.send_signal(number)
-    assert process.wait(START_PATIENCE) == 0
-    assert json.loads(process.stderr.read().splitlines()[-1])["message"] == "stopped"
 
 
 def test_a_process_serves_and_stops_when_told_to():

@@ -126,6 +126,11 @@ class Executor:
             return self._wait(lane)
 
     @property
+    def alive(self) -> bool:
+        """Whether no worker has died."""
+        return not self._open or all(thread.is_alive() for thread in self._threads)
+
+    @property
     def queue_depth(self) -> int:
         """Tasks that wait for a worker."""
         return len(self._queues)

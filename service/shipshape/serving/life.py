@@ -1,11 +1,15 @@
 """The process: bundle -> pipeline -> service -> wait for a signal -> stop. The only place that joins them all."""
 
 import logging
+import math
 import queue
 import signal
 import sys
 import threading
+import time
 from contextlib import suppress
+from functools import partial
+from pathlib import Path
 
 from shipshape.bundle import load_bundle
 from shipshape.errors import BundleError, Cancelled
@@ -38,37 +42,52 @@ def serve(settings: Settings) -> int:
     ends: queue.SimpleQueue[End] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda received, frame: ends.put(received))
+    load = partial(_load, limits=ContactLimits(max_points=settings.max_points))
     try:
-        bundle = load_bundle(settings.bundle)
-        model = Model(bundle, Pipeline(bundle, ContactLimits(max_points=settings.max_points)))
-        service = Service(settings, render_png, on_death=lambda: ends.put(None))
+        model = load(settings.bundle)
+        service = Service(settings, render_png, load=load, on_death=lambda: ends.put(None))
         addresses = service.start()
     except (BundleError, OSError) as error:
         return _failed(error, str(error))
     _logger.info("live on REST port %d, gRPC port %d", addresses.rest_port, addresses.grpc_port)
-    ended_by = _run(service, model, addresses, ends)
+    ended_by = _run(service, model, addresses, ends, settings.linger_s)
     if isinstance(ended_by, Exception):
-        return _failed(ended_by, f"expected bundle {bundle.name} to answer the built-in contact, got {ended_by!r}")
+        name = model.bundle.name
+        return _failed(ended_by, f"expected bundle {name} to answer the built-in contact, got {ended_by!r}")
     _logger.info("stopped")
     return FAILED if ended_by is None else OK
 
 
-def _run(service: Service, model: Model, addresses: Addresses, ends: "queue.SimpleQueue[End]") -> End:
+def _load(folder: Path, limits: ContactLimits) -> Model:
+    bundle = load_bundle(folder)
+    return Model(bundle, Pipeline(bundle, limits))
+
+
+def _run(
+    service: Service, model: Model, addresses: Addresses, ends: "queue.SimpleQueue[End]", linger_s: float
+) -> End:
     """Ready, then stopped; what it was ended by. The warm-up has its own thread: a signal must not wait for it."""
     opening = threading.Thread(target=_open, args=(service, model, addresses, ends), name="warm-up", daemon=True)
     opening.start()
     try:
-        return _first(ends)
+        ended_by = _first(ends)
+        if isinstance(ended_by, int) and service.leave() and linger_s > 0:
+            _logger.info("not ready, requests are still taken for %g s or until another signal", linger_s)
+            _first(ends, linger_s)
+        return ended_by
     finally:
         service.stop()
         opening.join(LEAVE_S)
 
 
-def _first(ends: "queue.SimpleQueue[End]") -> End:
+def _first(ends: "queue.SimpleQueue[End]", seconds: float = math.inf) -> End:
+    """The first end; None also when there is none in time."""
+    end = time.monotonic() + seconds
     # Without the timeout, a signal in the instant before the wait would set its flag and wake nobody.
-    while True:
+    while (left := end - time.monotonic()) > 0:
         with suppress(queue.Empty):
-            return ends.get(timeout=LOOK_S)
+            return ends.get(timeout=min(LOOK_S, left))
+    return None
 
 
 def _open(service: Service, model: Model, addresses: Addresses, ends: "queue.SimpleQueue[End]") -> None:

@@ -1,8 +1,11 @@
-"""One contact through everything a request can ask for, so that no caller pays for the first time."""
+"""One contact through everything a request can ask for: no caller pays for the first time, none gets NaN."""
 
 from collections.abc import Callable
 
-from shipshape.errors import Cancelled
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shipshape.errors import BundleError, Cancelled
 from shipshape.sample import sample_contact
 from shipshape.serving.core import Model, Render
 from shipshape.types import Contact, ImageMethod, Options, Preset, Recognition, Rung
@@ -13,6 +16,7 @@ def warm_up(model: Model, render: Render, stopping: Callable[[], bool]) -> None:
 
     Raises:
         Cancelled: `stopping` said so before a stage.
+        BundleError: A number of an answer is not finite.
         Exception: Whatever a stage raises.
     """
     contact = sample_contact()
@@ -28,4 +32,22 @@ def _run(model: Model, contact: Contact, options: Options, stopping: Callable[[]
         if stopping():
             raise Cancelled("expected to end the warm-up, got a signal to stop")
         stage.run(work)
-    return model.pipeline.finish(work, {}, Rung.FULL, "")
+    recognition = model.pipeline.finish(work, {}, Rung.FULL, "")
+    _check_finite(recognition, options)
+    return recognition
+
+
+def _check_finite(found: Recognition, options: Options) -> None:
+    numbers: dict[str, ArrayLike] = {
+        "probabilities": [*found.probabilities.values()],
+        "heading": [found.heading, found.heading_std, found.bow_probability, found.aspect_deg],
+        "box": [*found.box.center_level, found.box.size.length, found.box.size.beam, found.box.size.height],
+        "restored": found.restored.points_level,
+        "keypoints": found.keypoints_level,
+    }
+    for name, values in numbers.items():
+        if not np.isfinite(values).all():
+            raise BundleError(
+                f"expected finite numbers from the bundle for the built-in contact, got NaN or infinity in {name} "
+                f"with preset {options.preset}"
+            )

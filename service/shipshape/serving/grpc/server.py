@@ -20,12 +20,13 @@ from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2_grpc
 
 SERVICES = (V1.service, GUARDED.service)
+LIVE = "live"  # the name under which grpc.health.v1 tells whether the process is worth keeping
 SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and for reflection streams
 MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that the refusal is ours, in one sentence
 
 
 class GrpcDoor:
-    """Listens from `start` to `begin_stop`; alive from the start, SERVING between `open` and `close`.
+    """Listens from `start` to `begin_stop`; says of its health what it is told.
 
     Args:
         core: Answers.
@@ -60,7 +61,6 @@ class GrpcDoor:
         add_GRPCInferenceServiceServicer_to_server(oip, self._server)  # type: ignore[no-untyped-call]
         health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
         add_reflection((*SERVICES, health.SERVICE_NAME), self._server)
-        self.close()
 
     def start(self, host: str, port: int) -> int:
         """Listen; the real port.
@@ -79,13 +79,11 @@ class GrpcDoor:
         self._server.start()
         return bound
 
-    def open(self) -> None:
-        """Tell health checks that requests are taken."""
-        self._set(health_pb2.HealthCheckResponse.SERVING)
-
-    def close(self) -> None:
-        """Tell health checks that requests are not taken."""
-        self._set(health_pb2.HealthCheckResponse.NOT_SERVING)
+    def tell(self, *, live: bool, ready: bool) -> None:
+        """What health checks hear from now on, and their watchers at once."""
+        for service, serving in {LIVE: live, **dict.fromkeys(("", *SERVICES), ready)}.items():
+            answer = health_pb2.HealthCheckResponse
+            self._health.set(service, answer.SERVING if serving else answer.NOT_SERVING)
 
     def begin_stop(self, drain_s: float) -> threading.Event:
         """Accept no more; set once all under way has ended, or was broken off after `drain_s` seconds.
@@ -94,10 +92,6 @@ class GrpcDoor:
         """
         self._streams.stop()
         return self._server.stop(drain_s)
-
-    def _set(self, status: int) -> None:
-        for service in ("", *SERVICES):
-            self._health.set(service, status)
 
 
 def _bracketed(host: str) -> str:

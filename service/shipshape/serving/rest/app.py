@@ -6,16 +6,18 @@ from importlib.metadata import version
 from typing import Any
 
 from fastapi import FastAPI
-from fastapi.responses import PlainTextResponse
 
 from shipshape.serving.access import Access
 from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
+from shipshape.serving.health import Health
 from shipshape.serving.rest import contract
 from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.doorkeeper import Doorkeeper
+from shipshape.serving.rest.farewell import Farewell
 from shipshape.serving.rest.json_process import JsonProcess
 from shipshape.serving.rest.oip_routes import OipRoutes
+from shipshape.serving.rest.probes import add_probes
 from shipshape.serving.rest.problems import add_handlers
 from shipshape.serving.rest.routes import Routes
 from shipshape.serving.rest.schemas import CapacityAnswer, ModelAnswer, RecognitionAnswer, ScanAnswer
@@ -29,7 +31,7 @@ radians, except where a name ends in _deg. Packed points are little-endian float
 """
 
 
-def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access) -> FastAPI:
+def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, health: Health) -> FastAPI:
     """The application; it answers 503 until the core is open."""
     json = JsonProcess(core.limits)
     # The framework's documentation pages load scripts from elsewhere; the contract itself is at /openapi.json.
@@ -56,13 +58,12 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access) 
     add("/v1/model", routes.model, "GET", **_api(ModelAnswer, not_ready | stranger, None))
     capacity_extra = contract.capacity_extra()
     add("/v1/capacity", routes.capacity, "GET", **_api(CapacityAnswer, not_ready | stranger, capacity_extra))
-    add("/livez", routes.live, "GET")
-    add("/readyz", routes.ready, "GET", responses=not_ready)
-    add("/metrics", routes.metrics, "GET", response_class=PlainTextResponse, responses=stranger)
+    add_probes(app, health, metrics.registry)
     app.router.routes.extend(OipRoutes(core, metrics, timeouts, access.clients, bodies).routes())
     add_handlers(app)
     contract.add_contract(app)
     app.add_middleware(Doorkeeper, access=access)
+    app.add_middleware(Farewell, health=health)
     return app
 
 

@@ -37,7 +37,7 @@ def identify(request: Request) -> str:
 def problem(fault: Fault) -> Response:
     """The problem document of a fault."""
     title = fault.kind.replace("_", " ").capitalize()
-    response = _document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
+    response = document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
     response.headers.update(retry_headers(fault))
     if fault.kind is FaultKind.UNAUTHENTICATED:
         response.headers["WWW-Authenticate"] = "Bearer"
@@ -69,7 +69,7 @@ def _framework_refusal(request: Request, error: Exception) -> Response:
     elif error.status_code == 405:
         allowed = (error.headers or {}).get("Allow", "another method")
         detail = f"expected {allowed} on {request.url.path}, got {request.method}"
-    response = _document(error.status_code, title=title, detail=detail, error=FaultKind.INVALID_INPUT)
+    response = document(error.status_code, title=title, detail=detail, error=FaultKind.INVALID_INPUT)
     response.headers.update(error.headers or {})
     return response
 
@@ -87,7 +87,8 @@ def _unforeseen(request: Request, error: Exception) -> Response:
     return problem(fault_of(error))
 
 
-def _document(status: int, *, title: str, detail: str, error: FaultKind) -> Response:
+def document(status: int, *, title: str, detail: str, error: str) -> Response:
+    """A problem document in the words given."""
     body = {
         "type": f"urn:shipshape:problem:{error}",
         "title": title,

@@ -4,10 +4,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import TypeVar
 
 from fastapi import HTTPException, Request, Response
-from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
 from starlette.concurrency import run_in_threadpool
 
-from shipshape.errors import NotReady
 from shipshape.executor import Lane, Ticket
 from shipshape.serving.clients import Clients, Share
 from shipshape.serving.core import Answer, Core, Scan, conclude, outcome_of
@@ -74,22 +72,6 @@ class Routes:
     async def capacity(self, request: Request) -> Response:
         """What the service would promise now, and how its latency budget is doing."""
         return await self._guarded(request, "capacity", self._capacity)
-
-    async def live(self) -> Response:
-        """The process answers."""
-        return _json(b'{"status":"live"}')
-
-    async def ready(self, request: Request) -> Response:
-        """Requests are taken: every stage is warm and nobody asked the service to stop."""
-        if self._core.ready:
-            return _json(b'{"status":"ready"}')
-        identify(request)
-        return problem(fault_of(NotReady("expected a ready service, got one that is starting or stopping")))
-
-    async def metrics(self) -> Response:
-        """Prometheus text."""
-        text = await run_in_threadpool(generate_latest, self._metrics.registry)
-        return Response(text, media_type=CONTENT_TYPE_LATEST)
 
     async def _guarded(self, request: Request, method: str, handle: Handler) -> Response:
         """What every method passes: request id, metrics, and the table of errors."""

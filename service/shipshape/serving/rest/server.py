@@ -1,4 +1,4 @@
-"""The REST door's listener: uvicorn in a thread of its own, on a socket that was bound before."""
+"""An HTTP listener: uvicorn in a thread of its own, on a socket that was bound before."""
 
 import socket
 import ssl
@@ -25,11 +25,13 @@ class RestDoor:
         app: Answers.
         tls: None speaks plain HTTP.
         on_death: Called when the listener ends without having been asked to.
+        name: How threads and error messages call it.
     """
 
-    def __init__(self, app: FastAPI, tls: Tls | None, *, on_death: Callable[[], None]) -> None:
+    def __init__(self, app: FastAPI, tls: Tls | None, *, on_death: Callable[[], None], name: str = "REST") -> None:
         self._app = app
         self._tls = tls
+        self._name = name
         self._on_death = on_death
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -40,7 +42,7 @@ class RestDoor:
         Raises:
             OSError: The address cannot be bound.
         """
-        listener = _listener(host, port)
+        listener = _listener(host, port, self._name)
         bound: int = listener.getsockname()[1]
         # log_config: the service's own log format holds. access_log: the metrics and debug lines tell more.
         config = uvicorn.Config(
@@ -58,7 +60,7 @@ class RestDoor:
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(
-            target=self._serve, args=(self._server, listener), name="rest", daemon=True
+            target=self._serve, args=(self._server, listener), name=self._name.lower(), daemon=True
         )
         self._thread.start()
         return bound
@@ -84,7 +86,7 @@ def _context(tls: Tls, *_: Any) -> ssl.SSLContext:  # what uvicorn passes on is 
     return tls.context()
 
 
-def _listener(host: str, port: int) -> socket.socket:
+def _listener(host: str, port: int, name: str) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -93,5 +95,6 @@ def _listener(host: str, port: int) -> socket.socket:
         listener.listen(2048)
     except OSError as error:
         listener.close()
-        raise OSError(f"expected to listen on {host}:{port} for REST, got: {error.strerror or error}") from error
+        reason = error.strerror or error
+        raise OSError(f"expected to listen on {host}:{port} for {name}, got: {reason}") from error
     return listener

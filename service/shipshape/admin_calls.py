@@ -1,0 +1,67 @@
+"""The calls of `shipshape admin`: one request to the admin door of a service, its answer on stdout."""
+
+import argparse
+import json
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+from shipshape.errors import SettingsError
+
+OK, REFUSED = 0, 1
+PATIENCE_S = 120.0  # a swap loads and tries a whole bundle, on a loaded machine
+CALLS = {
+    "status": ("GET", "/admin/status"),
+    "swap": ("POST", "/admin/bundle"),
+    "rollback": ("POST", "/admin/rollback"),
+    "drain": ("POST", "/admin/drain"),
+    "resume": ("POST", "/admin/resume"),
+}
+
+
+def admin(arguments: argparse.Namespace) -> int:
+    """Make one call; 1 when the service refused it or cannot be reached."""
+    method, path = CALLS[arguments.call]
+    body = json.dumps({"folder": str(arguments.folder)}).encode() if arguments.call == "swap" else None
+    request = urllib.request.Request(_url(arguments.url) + path, body, method=method)
+    request.add_header("Authorization", f"Bearer {_token(arguments.token_file)}")
+    request.add_header("Content-Type", "application/json")
+    # No proxy: the door is on loopback, and whatever the environment names would learn the token.
+    http = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    try:
+        with http.open(request, timeout=PATIENCE_S) as response:
+            print(json.dumps(json.load(response), indent=2))
+    except urllib.error.HTTPError as error:
+        with error:
+            return _failed(_detail(error))
+    except OSError as error:  # URLError is one
+        return _failed(f"expected an admin door at {arguments.url}, got: {getattr(error, 'reason', error)}")
+    return OK
+
+
+def _url(given: str) -> str:
+    if not given.startswith(("http://", "https://")):
+        raise SettingsError(f"expected --url to begin with http:// or https://, got {given!r:.80}")
+    return given.rstrip("/")
+
+
+def _token(file: Path) -> str:
+    try:
+        return file.read_text(encoding="ascii").strip()
+    except OSError as error:
+        raise SettingsError(f"expected to read a token from {file}, got: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"expected a token in {file}, got bytes that are none") from error
+
+
+def _detail(error: urllib.error.HTTPError) -> str:
+    try:
+        return str(json.load(error)["detail"])
+    except (ValueError, KeyError, TypeError):
+        return f"expected an answer of an admin door, got status {error.code}"
+
+
+def _failed(sentence: str) -> int:
+    print(f"shipshape: {sentence}", file=sys.stderr)
+    return REFUSED
