@@ -130,7 +130,7 @@ class Service:
         with self._turn:
             self._leaving.set()
             self.health.move_to(State.STOPPING)
-            return self._core.ready
+            return self.models.running is not None
 
     def stop(self) -> None:
         """Not ready, refuse, accept no more, let what is under way end, for up to `drain_s` seconds."""
