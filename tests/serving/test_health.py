@@ -1,7 +1,9 @@
 """Started, live and ready are three things, and both doors and the health port tell the same."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
+import grpc
 import httpx
 import pytest
 from grpc_health.v1 import health_pb2
@@ -9,6 +11,7 @@ from grpc_health.v1.health_pb2_grpc import HealthStub
 
 from serving.fakes import DIGEST, FAKE_BUNDLE, PATIENCE, FakePipeline, cluster, request, running, until
 from shipshape.serving.core import Model
+from shipshape.serving.grpc.watching import PLACES
 from shipshape.serving.health import Health, State
 
 READY, NOT_READY = (True, True, True), (True, True, False)
@@ -142,3 +145,48 @@ def test_a_service_that_drains_its_work_is_live_to_the_last_answer():
         stopping.join(PATIENCE)
         with pytest.raises(httpx.ConnectError):
             httpx.get(live, trust_env=False, timeout=PATIENCE)
+
+
+def test_watchers_that_come_and_go_while_the_state_changes_hold_nobody_up():
+    """With the servicer of grpc_health as it comes, this stops the door for good."""
+    with running() as doors, ThreadPoolExecutor(4) as pool:
+
+        def come_and_go():
+            with grpc.insecure_channel(f"127.0.0.1:{doors.addresses.grpc_port}") as channel:
+                for _ in range(50):
+                    watch = HealthStub(channel).Watch(health_pb2.HealthCheckRequest(), timeout=PATIENCE)
+                    next(watch)
+                    watch.cancel()
+
+        watching = [pool.submit(come_and_go) for _ in range(4)]
+        while not all(each.done() for each in watching):
+            doors.service.health.drain()
+            doors.service.health.resume()
+        for each in watching:
+            each.result()
+        assert told(doors) == READY
+
+
+def test_one_watcher_too_many_is_refused_and_its_place_comes_back():
+    with running() as doors:
+        watch = HealthStub(doors.channel).Watch
+        held = [watch(health_pb2.HealthCheckRequest()) for _ in range(PLACES)]
+        for each in held:
+            next(each)
+        refused = watch(health_pb2.HealthCheckRequest(), timeout=PATIENCE)
+        assert refused.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+        assert refused.details() == f"expected at most {PLACES} watchers at a time, got one more"
+        held.pop().cancel()
+        until(lambda: _is_taken(watch))
+        for each in held:
+            each.cancel()
+
+
+def _is_taken(watch):
+    call = watch(health_pb2.HealthCheckRequest(), timeout=PATIENCE)
+    try:
+        return next(call) is not None
+    except grpc.RpcError:
+        return False
+    finally:
+        call.cancel()

@@ -15,6 +15,7 @@ from shipshape.serving.grpc.oip_servicer import GUARDED, OipServicer
 from shipshape.serving.grpc.reflection import PLACES, add_reflection
 from shipshape.serving.grpc.servicer import Servicer
 from shipshape.serving.grpc.streams import STREAMS, Streams
+from shipshape.serving.grpc.watching import WatchedHealth
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2_grpc
@@ -41,7 +42,7 @@ class GrpcDoor:
     def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, *, waiting: int) -> None:
         limits = core.limits
         self._tls = access.tls
-        self._health = health.HealthServicer()
+        self._health = WatchedHealth()
         self._server = grpc.server(
             ThreadPoolExecutor(waiting + SPARE_THREADS + STREAMS, thread_name_prefix="grpc"),
             interceptors=[
