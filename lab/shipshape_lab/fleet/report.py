@@ -125,7 +125,7 @@ def _ranges(axes: Axes, found: dict) -> None:
         axes.plot(middles, list(bands.values()), marker="o", color=colour, label=name)
     axes.set_xlabel("range, m", fontsize=9)
     axes.set_ylabel("right vessel, %", fontsize=9)
-    axes.set_ylim(top=100.5)
+    axes.set_ylim(top=min(100.0, axes.get_ylim()[1]) + 0.02)
     axes.grid(color="0.9")
     axes.spines[["top", "right"]].set_visible(False)
     axes.set_title("accuracy by range", fontsize=10, loc="left")

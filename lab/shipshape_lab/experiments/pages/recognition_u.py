@@ -59,7 +59,7 @@ def _kinds(numbers: Numbers, systems: list[str]) -> list[tuple[str, ...]]:
             plain(numbers, prefix + kind, 4),
             *(percent(numbers, f"U.called_unknown.{s}.{kind}") for s in systems),
         )
-        for kind in sorted(kinds, key=lambda kind: numbers[prefix + kind])
+        for kind in sorted(kinds, key=lambda kind: (numbers[prefix + kind], kind))
     ]
 
 
