@@ -1,0 +1,1 @@
+"""One server a file, each as its own documentation recommends; `benchmarks.serving.servers` starts them."""
