@@ -85,11 +85,10 @@ def _once(file: Path, task: Callable[[Path], Numbers]) -> None:
 
 def _plan(args: argparse.Namespace) -> Plan:
     cores = sorted(os.sched_getaffinity(0))
-    if len(cores) <= args.cores:
-        raise SystemExit(
-            f"expected more than {args.cores} usable cores, one for the load generator, got {len(cores)}"
-        )
-    return Plan(args.seconds, tuple(cores[-args.cores :]), tuple(cores[: -args.cores]), args.seed)
+    if not 1 <= args.cores <= len(cores):
+        raise SystemExit(f"expected --cores of the {len(cores)} usable ones, got {args.cores}")
+    rest = cores[: -args.cores] or cores  # with none left over, the generator shares them
+    return Plan(args.seconds, tuple(cores[-args.cores :]), tuple(rest), args.seed)
 
 
 def _keep_to(plan: Plan, run: Path) -> None:
@@ -135,7 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--rounds", type=int, default=3, help="of every server in turns (default 3)")
     parser.add_argument("--seconds", type=float, default=10.0, help="of each measurement (default 10)")
     parser.add_argument("--quick", action="store_true", help="one round of 2 seconds: does everything work?")
-    parser.add_argument("--cores", type=int, default=1, help="of a server; the rest generates load (default 1)")
+    parser.add_argument("--cores", type=int, default=1, help="of a server; others generate load (default 1)")
     parser.add_argument("--run", type=Path, default=Path("runs/serving/run"), help="folder of the rounds")
     parser.add_argument("--out", type=Path, default=Path("benchmarks/results"), help="folder of the results")
     parser.add_argument("--seed", type=int, default=5, help="of contacts and arrivals (default 5)")

@@ -31,7 +31,7 @@ a round the servers take turns, each started anew.
 - **throughput / limit**: contacts a second over those of the bare pipeline on the same cores, a process a core.
 - **p99 / p50**: open loop, Poisson arrivals at 70 % of its own throughput; latency from the scheduled time.
 - **RSS**: of all its processes; pages that they share count once each. **ready**: from start to first answer.
-- Server and load generator stay on cores of their own. Peers run a worker process a core.
+- Server and load generator stay on cores of their own, unless all are the server's. Peers run a process a core.
 - Handicaps: Shipshape answers with its full contract, and checks, admits and meters each request, where the peers
   answer vessel, probability, heading and box. Its ladder of cheaper answers is forbidden here. `fastapi_binary`
   computes where it receives, so nothing else is answered meanwhile.

@@ -25,9 +25,14 @@ class Recogniser(MLModel):
         return InferenceResponse(model_name=self.name, outputs=[output])
 
 
-if __name__ == "__main__":
+async def serve() -> None:
+    """Until it is told to stop."""
     settings = Settings(
         host=HOST, http_port=PORT, grpc_port=PORT + 1, metrics_port=PORT + 2, parallel_workers=CORES, debug=False
     )
     model = ModelSettings(name="recognise", implementation=f"{__spec__.name}.Recogniser")
-    asyncio.run(MLServer(settings).start([model]))
+    await MLServer(settings).start([model])
+
+
+if __name__ == "__main__":
+    asyncio.run(serve())
