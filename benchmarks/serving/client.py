@@ -23,7 +23,6 @@ STATUS = {  # of gRPC, as HTTP
 }
 LOST = 0  # the connection broke
 SPIN_S = 0.002  # before an arrival: timers are a millisecond late
-MOST_CONNECTIONS = 1024
 Reply = tuple[int, bytes]
 Ask = Callable[[bytes], Awaitable[Reply]]
 _loop = asyncio.Runner(loop_factory=uvloop.new_event_loop)  # one for all calls: gRPC keeps to its first
@@ -62,7 +61,7 @@ def closed(wire: Wire, port: int, seconds: float) -> Load:
 
 def open_loop(wire: Wire, port: int, seconds: float, rate: float, seed: int) -> Load:
     """Requests at Poisson times, `rate` a second, however the server does."""
-    times = np.cumsum(np.random.default_rng(seed).exponential(1 / rate, int(rate * seconds)))
+    times = np.cumsum(np.random.default_rng(seed).exponential(1 / rate, max(1, int(rate * seconds))))
     return _loop.run(_open(wire, port + wire.port, times))
 
 
@@ -99,7 +98,7 @@ async def _again(ask: Ask, wire: Wire, offset: int, end: float, log: "_Log") -> 
 
 
 async def _open(wire: Wire, port: int, times: np.ndarray) -> Load:
-    log, idle, limit = _Log(), [], asyncio.Semaphore(MOST_CONNECTIONS)
+    log, idle, limit = _Log(), [], asyncio.Semaphore(wire.most)
     async with AsyncExitStack() as stack:
         idle += [await _connect(wire, port, stack) for _ in range(wire.connections)]
 
@@ -199,7 +198,7 @@ def _stream(channel: grpc.aio.Channel, method: str) -> Ask:
             await call.write(request)
             body = await call.read()
             return (LOST, b"") if body is grpc.aio.EOF else (200, body)
-        except grpc.aio.AioRpcError as error:
-            return STATUS.get(error.code(), 500), b""
+        except (grpc.aio.AioRpcError, asyncio.InvalidStateError):  # the whole call ended
+            return LOST, b""
 
     return ask

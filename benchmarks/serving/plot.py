@@ -21,6 +21,7 @@ def draw(numbers: Flat, servers: Sequence[Server], path: Path) -> None:
         (server for server in servers if f"efficiency.{server.name}" in numbers),
         key=lambda server: float(numbers[f"efficiency.{server.name}"]),
     )
+    names = [f"Shipshape {server.name}" if server.ours else server.name for server in shown]
     figure = Figure(figsize=(10, 1.2 + 0.34 * len(shown)), layout="constrained")
     for axes, (key, title) in zip(figure.subplots(1, len(PANELS), sharey=True), PANELS.items(), strict=True):
         middle = [float(numbers[f"{key}.{server.name}"]) for server in shown]
@@ -32,13 +33,14 @@ def draw(numbers: Flat, servers: Sequence[Server], path: Path) -> None:
         ]
         colours = [OURS if server.ours else PEER for server in shown]
         bars = axes.barh(
-            [server.name for server in shown],
+            names,
             middle,
             color=colours,
             xerr=errors,
             error_kw={"ecolor": LIMIT, "lw": 1},
         )
-        axes.bar_label(bars, [f"{value:.2f}" for value in middle], label_type="center", fontsize=8)
+        for label, server in zip(axes.bar_label(bars, fmt="%.2f", label_type="center"), shown, strict=True):
+            label.set(color="white" if server.ours else "black", fontsize=8)
         axes.set_title(title, fontsize=10, loc="left")
         axes.spines[["top", "right"]].set_visible(False)
     efficiency, tail = figure.axes

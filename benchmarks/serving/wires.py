@@ -9,6 +9,7 @@ import numpy as np
 from shipshape.v1 import shipshape_pb2 as pb
 
 SINGLE, SCAN = 16, 4  # connections of requests with one contact, and with many
+CHANNELS = 64  # of gRPC in an open loop
 GRPC = 1  # port of our gRPC door beyond that of REST
 SERVICE = "/shipshape.v1.Shipshape"
 FULL = pb.Options(lowest_rung=pb.RUNG_FULL)  # a cheaper answer would not be the same work
@@ -25,6 +26,7 @@ class Wire:
         method: Of a gRPC call.
         contacts: Of each request.
         connections: In a closed loop.
+        most: Connections of an open loop: it opens more as it needs them, and beyond these requests wait.
         port: Beyond the server's first.
     """
 
@@ -34,6 +36,7 @@ class Wire:
     method: str = ""
     contacts: int = 1
     connections: int = SINGLE
+    most: int = 1024
     port: int = 0
 
 
@@ -82,13 +85,15 @@ def v2_binary(path: str) -> Callable[[Clusters], Wire]:
 def unary(clusters: Clusters) -> Wire:
     """Our gRPC call with one contact."""
     requests = [pb.RecogniseRequest(contact=contact, options=FULL) for contact in _messages(clusters)]
-    return Wire("unary", _written(requests), vessel_of, f"{SERVICE}/Recognise", port=GRPC)
+    return Wire("unary", _written(requests), vessel_of, f"{SERVICE}/Recognise", most=CHANNELS, port=GRPC)
 
 
 def stream(clusters: Clusters) -> Wire:
     """Our gRPC stream, one contact a message, one message at a time."""
     requests = [pb.RecogniseStreamRequest(contacts=[contact], options=FULL) for contact in _messages(clusters)]
-    return Wire("stream", _written(requests), vessels_of_message, f"{SERVICE}/RecogniseStream", port=GRPC)
+    return Wire(
+        "stream", _written(requests), vessels_of_message, f"{SERVICE}/RecogniseStream", most=SINGLE, port=GRPC
+    )
 
 
 def scan(size: int) -> Callable[[Clusters], Wire]:
@@ -97,7 +102,9 @@ def scan(size: int) -> Callable[[Clusters], Wire]:
     def write(clusters: Clusters) -> Wire:
         contacts = _messages([clusters[index % len(clusters)] for index in range(size)])
         request = pb.RecogniseScanRequest(contacts=contacts, options=FULL)
-        return Wire("unary", _written([request]), vessels_of_scan, f"{SERVICE}/RecogniseScan", size, SCAN, GRPC)
+        return Wire(
+            "unary", _written([request]), vessels_of_scan, f"{SERVICE}/RecogniseScan", size, SCAN, CHANNELS, GRPC
+        )
 
     return write
 

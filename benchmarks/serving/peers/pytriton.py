@@ -1,6 +1,8 @@
 """PyTriton: an instance of the callable a core behind Triton, Open Inference Protocol with binary tensors."""
 
 import json
+import os
+import sysconfig
 
 import numpy as np
 from pytriton.model_config import ModelConfig, Tensor
@@ -18,6 +20,8 @@ def infer(requests: list) -> list[dict]:
 
 
 if __name__ == "__main__":
+    # Triton's own Python must be that of the standard library it finds, as PyTriton's installation page says.
+    os.environ["LD_LIBRARY_PATH"] = sysconfig.get_config_var("LIBDIR")
     config = TritonConfig(http_address=HOST, http_port=PORT, grpc_port=PORT + 1, metrics_port=PORT + 2)
     with Triton(config=config) as triton:
         triton.bind(
