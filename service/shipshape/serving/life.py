@@ -1,5 +1,6 @@
 """The process: bundle -> pipeline -> service -> wait for a signal -> stop. The only place that joins them all."""
 
+import gc
 import logging
 import math
 import queue
@@ -93,6 +94,10 @@ def _first(ends: "queue.SimpleQueue[End]", seconds: float = math.inf) -> End:
 def _open(service: Service, model: Model, addresses: Addresses, ends: "queue.SimpleQueue[End]") -> None:
     try:
         service.open(model)
+        # Nothing that is there by now will be garbage. Looking through it at each full collection would hold all
+        # threads up for tens of milliseconds.
+        gc.collect()
+        gc.freeze()
         _logger.info("ready: %s, bundle %s (%s)", addresses, model.bundle.name, model.bundle.digest)
     except Cancelled:
         _logger.info("stopped before it was ready")
