@@ -47,6 +47,16 @@ def test_a_machine_that_became_slower_is_soon_known():
     assert costs.of(stage, 300) == pytest.approx(0.003, rel=0.05)
 
 
+def test_one_stall_is_no_new_cost_but_many_are():
+    costs, stage = Costs(), Thing()
+    for seconds in [0.001] * 20 + [10.0]:
+        costs.learn(stage, 300, seconds)
+    assert costs.of(stage, 300) < 0.002
+    for _ in range(MEMORY):
+        costs.learn(stage, 300, 0.1)
+    assert costs.of(stage, 300) == pytest.approx(0.1, rel=0.4)
+
+
 def test_stages_that_are_gone_are_forgotten():
     costs, stage = Costs(), Thing()
     costs.learn(stage, 300, 0.001)

@@ -4,6 +4,8 @@ import weakref
 from collections.abc import Iterable
 
 MEMORY = 200  # observations after which one has lost most of its weight
+MOST = 10.0  # times what was expected, that one observation counts for: a thread may lose its core for long
+_FEW, _LEAST_S = 4, 1e-5  # observations before which nothing is expected; what is never too long
 _NO_SPREAD = 1e-9  # of sizes: below it, nothing is known of a slope
 
 
@@ -19,6 +21,8 @@ class _Line:
 
     def learn(self, size: float, seconds: float) -> None:
         """One more observation."""
+        if self.seen >= _FEW:
+            seconds = min(seconds, MOST * max(self.at(size), _LEAST_S))
         self.seen += 1
         weight = max(1.0 / self.seen, 2.0 / MEMORY)  # the first ones count alike, so that it is soon right
         off_size, off_seconds = size - self.size, seconds - self.seconds
