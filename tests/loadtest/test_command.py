@@ -136,7 +136,8 @@ def test_no_target_is_2(capsys):
     assert capsys.readouterr().err.startswith("shipshape: expected a description at http://127.0.0.1:1/v1/model")
 
 
-def test_a_process_that_dies_is_told():
+@pytest.mark.parametrize("seen", [False, True])  # by the time of the order, or not yet
+def test_a_process_that_dies_is_told(seen):
     with running() as doors:
         arguments = argparse.Namespace(
             **vars(build_parser().parse_args(["loadtest", f"grpc://127.0.0.1:{doors.addresses.grpc_port}"]))
@@ -144,6 +145,8 @@ def test_a_process_that_dies_is_told():
         test = options_of(arguments)
         with Processes(test.address, 1) as processes:
             processes._processes[0].kill()
+            if seen:
+                processes._processes[0].join()
             with pytest.raises(TargetError, match="expected the sending processes to live"):
                 processes.run(test.plan(100.0, 2.0))
 

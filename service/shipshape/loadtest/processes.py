@@ -73,13 +73,13 @@ class Processes:
             TargetError: A process died.
         """
         for index, pipe in enumerate(self._pipes):
-            pipe.send((plan.part(index, len(self._pipes)), watch is not None))
+            _send(pipe, (plan.part(index, len(self._pipes)), watch is not None))
         for pipe in self._pipes:
             self._receive(pipe)  # prepared
         # All processes of a machine share one monotonic clock.
         start = time.monotonic() + HEAD_START_S + max(0.0, -float(plan.due.min(initial=0.0)))
         for pipe in self._pipes:
-            pipe.send(start)
+            _send(pipe, start)
         parts: dict[int, Records] = {}
         while len(parts) < len(self._pipes):
             waiting: dict[Any, int] = {pipe: index for index, pipe in enumerate(self._pipes) if index not in parts}
@@ -103,10 +103,21 @@ class Processes:
         try:
             message = pipe.recv()
         except (EOFError, ConnectionError) as error:
-            raise TargetError("expected the sending processes to live, got one that died: see above") from error
+            raise _died() from error
         if isinstance(message, ShipshapeError):
             raise message
         return message
+
+
+def _send(pipe: Any, message: Any) -> None:
+    try:
+        pipe.send(message)
+    except ConnectionError as error:
+        raise _died() from error
+
+
+def _died() -> TargetError:
+    return TargetError("expected the sending processes to live, got one that died: see above")
 
 
 def _main(pipe: "Connection[Any, Any]", address: Address) -> None:
