@@ -52,12 +52,26 @@ def test_live_but_not_ready():
         for path in ("/v2/health/ready", MODEL, MODEL + "/ready"):
             refused = doors.rest.get(path)
             assert refused.status_code == 503
-            assert refused.json()["error"].startswith("expected a running service")
+            assert refused.json()["error"].startswith(("expected a running service", "expected a ready service"))
         assert doors.rest.post(INFER, json=envelope({"points": POINTS})).status_code == 503
         assert stub(doors).ServerLive(pb.ServerLiveRequest(), timeout=PATIENCE).live
         assert not stub(doors).ServerReady(pb.ServerReadyRequest(), timeout=PATIENCE).ready
         assert not stub(doors).ModelReady(pb.ModelReadyRequest(name="shipshape"), timeout=PATIENCE).ready
         assert call(doors, message({"points": POINTS})).status is grpc.StatusCode.UNAVAILABLE
+
+
+def test_drained_is_not_ready_but_answers():
+    with running() as doors:
+        doors.service.health.drain()
+        for path in ("/v2/health/ready", MODEL + "/ready"):
+            refused = doors.rest.get(path)
+            assert (refused.status_code, refused.json()["kind"]) == (503, "not_ready")
+            assert "drained" in refused.json()["error"]
+        assert not stub(doors).ServerReady(pb.ServerReadyRequest(), timeout=PATIENCE).ready
+        assert not stub(doors).ModelReady(pb.ModelReadyRequest(name="shipshape"), timeout=PATIENCE).ready
+        assert doors.rest.post(INFER, json=envelope({"points": POINTS})).status_code == 200
+        doors.service.health.resume()
+        assert doors.rest.get("/v2/health/ready").status_code == 200
 
 
 def test_server_metadata(doors):

@@ -85,7 +85,9 @@ class Service:
         self.health = Health(self.executor)
         self.models = Models(load, self._try_out, self._publish)
         access = load_access(settings, metrics.count_client_refusal)
-        self._grpc = GrpcDoor(self._core, metrics, timeouts, access, waiting=settings.queue_limit + workers)
+        self._grpc = GrpcDoor(
+            self._core, metrics, timeouts, access, self.health, waiting=settings.queue_limit + workers
+        )
         app = build_app(self._core, metrics, timeouts, access, self.health)
         self._rest = RestDoor(app, access.tls, on_death=on_death)
         root = settings.bundle_root or settings.bundle.absolute().parent

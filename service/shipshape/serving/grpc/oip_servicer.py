@@ -8,6 +8,7 @@ from shipshape.serving.core import Core
 from shipshape.serving.grpc import oip_messages
 from shipshape.serving.grpc.guard import Guarded, current_call, set_trailing
 from shipshape.serving.grpc.servicer import cancel_with, deadline_of, set_timing
+from shipshape.serving.health import Health
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import submit
 from shipshape.serving.timing import Timeouts
@@ -28,8 +29,9 @@ GUARDED = Guarded(SERVICE, "oip_grpc", METHODS)
 class OipServicer(pb_grpc.GRPCInferenceServiceServicer):
     """The methods of the protocol; errors are the guard's matter."""
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts) -> None:
+    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, health: Health) -> None:
         self._core = core
+        self._health = health
         self._metrics = metrics
         self._timeouts = timeouts
 
@@ -39,14 +41,14 @@ class OipServicer(pb_grpc.GRPCInferenceServiceServicer):
         return pb.ServerLiveResponse(live=True)
 
     def ServerReady(self, request: pb.ServerReadyRequest, context: grpc.ServicerContext) -> pb.ServerReadyResponse:
-        """Whether requests are taken."""
+        """Whether requests should be sent here."""
         set_trailing(context)
-        return pb.ServerReadyResponse(ready=self._core.ready)
+        return pb.ServerReadyResponse(ready=self._health.ready)
 
     def ModelReady(self, request: pb.ModelReadyRequest, context: grpc.ServicerContext) -> pb.ModelReadyResponse:
-        """Whether requests for the model are taken."""
+        """Whether requests for the model should be sent here."""
         models.check_name(request.name)
-        ready = self._core.ready
+        ready = self._health.ready
         if ready:
             models.find_model(self._core, request.name, request.version)
         set_trailing(context)

@@ -4,7 +4,8 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import grpc
-from grpc_health.v1 import health, health_pb2, health_pb2_grpc
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from grpc_health.v1.health import SERVICE_NAME as HEALTH_SERVICE
 
 from shipshape.inference.open_inference_pb2_grpc import add_GRPCInferenceServiceServicer_to_server
 from shipshape.serving.access import Access
@@ -16,6 +17,7 @@ from shipshape.serving.grpc.reflection import PLACES, add_reflection
 from shipshape.serving.grpc.servicer import Servicer
 from shipshape.serving.grpc.streams import STREAMS, Streams
 from shipshape.serving.grpc.watching import WatchedHealth
+from shipshape.serving.health import Health
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2_grpc
@@ -34,12 +36,15 @@ class GrpcDoor:
         metrics: Told of every request.
         timeouts: Deadline of callers that set none.
         access: Who may come in.
+        health: Whether requests should be sent here.
         waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
             executor's queue, which is bounded and refuses, is where they wait; streams of contacts and of
             reflection, which hold a thread each as well, are bounded for the same reason.
     """
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, *, waiting: int) -> None:
+    def __init__(
+        self, core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, health: Health, *, waiting: int
+    ) -> None:
         limits = core.limits
         self._tls = access.tls
         self._health = WatchedHealth()
@@ -58,10 +63,10 @@ class GrpcDoor:
         self._streams = Streams(core, metrics, timeouts, access)
         servicer = Servicer(core, metrics, timeouts, self._streams)
         shipshape_pb2_grpc.add_ShipshapeServicer_to_server(servicer, self._server)  # type: ignore[no-untyped-call]
-        oip = OipServicer(core, metrics, timeouts)
+        oip = OipServicer(core, metrics, timeouts, health)
         add_GRPCInferenceServiceServicer_to_server(oip, self._server)  # type: ignore[no-untyped-call]
         health_pb2_grpc.add_HealthServicer_to_server(self._health, self._server)
-        add_reflection((*SERVICES, health.SERVICE_NAME), self._server)
+        add_reflection((*SERVICES, HEALTH_SERVICE), self._server)
 
     def start(self, host: str, port: int) -> int:
         """Listen; the real port.

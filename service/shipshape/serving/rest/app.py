@@ -59,7 +59,7 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, 
     capacity_extra = contract.capacity_extra()
     add("/v1/capacity", routes.capacity, "GET", **_api(CapacityAnswer, not_ready | stranger, capacity_extra))
     add_probes(app, health, metrics.registry)
-    app.router.routes.extend(OipRoutes(core, metrics, timeouts, access.clients, bodies).routes())
+    app.router.routes.extend(OipRoutes(core, metrics, timeouts, access.clients, bodies, health).routes())
     add_handlers(app)
     contract.add_contract(app)
     app.add_middleware(Doorkeeper, access=access)

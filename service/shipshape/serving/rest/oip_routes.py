@@ -9,9 +9,11 @@ from fastapi import HTTPException, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.routing import Route
 
+from shipshape.errors import NotReady
 from shipshape.serving.clients import Clients
 from shipshape.serving.core import Core, Model
 from shipshape.serving.faults import Fault, FaultKind, fault_of
+from shipshape.serving.health import Health
 from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import Inference, submit
@@ -38,14 +40,24 @@ class OipRoutes:
         timeouts: Deadline of callers that set none.
         clients: Hold each to its share.
         bodies: Bounds all bodies that are being read, those of the other paths too.
+        health: Whether requests should be sent here.
     """
 
-    def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, clients: Clients, bodies: Bodies) -> None:
+    def __init__(
+        self,
+        core: Core,
+        metrics: Metrics,
+        timeouts: Timeouts,
+        clients: Clients,
+        bodies: Bodies,
+        health: Health,
+    ) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
         self._clients = clients
         self._bodies = bodies
+        self._health = health
 
     def routes(self) -> list[Route]:
         """The paths; they are the protocol's, so /openapi.json does not list them."""
@@ -84,11 +96,12 @@ class OipRoutes:
         return _json({"live": True})
 
     async def _server_ready(self, _request: Request, _: Outcome) -> Response:
-        self._core.model()
+        self._check_ready()
         return _json({"ready": True, "live": True})  # the specification says live, its clients read ready
 
     async def _model_ready(self, request: Request, _: Outcome) -> Response:
         self._model(request)
+        self._check_ready()
         return _json({"name": models.NAME, "ready": True})
 
     async def _model_metadata(self, request: Request, _: Outcome) -> Response:
@@ -125,6 +138,10 @@ class OipRoutes:
         if json_bytes is None:
             return Response(content, headers=headers, media_type=JSON)
         return Response(content, headers={**headers, JSON_BYTES_HEADER: str(json_bytes)}, media_type=PACKED)
+
+    def _check_ready(self) -> None:
+        if not self._health.ready:
+            raise NotReady(f"expected a ready service, got one that is {self._health.state}")
 
     def _model(self, request: Request) -> Model:
         return models.find_model(self._core, request.path_params["name"], request.path_params.get("version", ""))
