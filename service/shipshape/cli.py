@@ -57,8 +57,7 @@ times are written as 50ms, 2s or 1m
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     arguments = build_parser().parse_args(argv)
-    # Only now: the numerical libraries take a second to load, and `--help` must not wait for them.
-    from shipshape.commands import COMMANDS  # noqa: PLC0415
+    from shipshape.commands import COMMANDS  # noqa: PLC0415  its libraries take a second, --help must not wait
 
     try:
         code = COMMANDS[arguments.command](arguments)

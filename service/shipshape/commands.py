@@ -93,8 +93,7 @@ def verify(arguments: argparse.Namespace) -> int:
 def loadtest(arguments: argparse.Namespace) -> int:
     """Test a running service as its client."""
     try:
-        # Only now: its libraries come with an extra, and no other command needs them.
-        from shipshape.loadtest.command import loadtest as run  # noqa: PLC0415
+        from shipshape.loadtest.command import loadtest as run  # noqa: PLC0415  its libraries are an extra
     except ModuleNotFoundError as error:
         raise SettingsError(
             f"expected the libraries of the extra shipshape[loadtest] to be installed, got no {error.name}"

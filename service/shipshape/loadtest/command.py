@@ -71,6 +71,7 @@ def _swept(arguments: argparse.Namespace, test: LoadTest, processes: Processes, 
     shortest = seconds_of(arguments.step)
 
     def holds(rate: float) -> bool:
+        """Run one step of the sweep, contacts a second, and keep it."""
         seconds = test.long_enough(rate, shortest)
         steps.append(Step(rate, seconds, _run(test, processes, rate, seconds)))
         print_step(steps[-1])

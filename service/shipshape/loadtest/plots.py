@@ -43,6 +43,7 @@ def percentiles(run: Summary) -> str:
     """Latency over percentile, the axis of which gives each nine the same room."""
 
     def draw(axes: Axes) -> None:
+        """Latency over the share of answers, as high dynamic range histograms are drawn."""
         curves = (("since due", run.latency.curve, FIRST), ("since sent", run.service.curve, SECOND))
         for name, curve, colour in curves:
             if curve:
@@ -63,6 +64,7 @@ def latency_over_time(run: Summary) -> str:
     """Median and 99th percentile of each part of the run."""
 
     def draw(axes: Axes) -> None:
+        """Two percentiles over time, with gaps where nothing was answered."""
         middle = [part.start_s + part.seconds / 2 for part in run.timeline]
         for name, colour in (("p99", FIRST), ("p50", SECOND)):
             values = [getattr(part, name) for part in run.timeline]
@@ -78,6 +80,7 @@ def outcomes_over_time(run: Summary) -> str:
     """Requests a second by how they ended."""
 
     def draw(axes: Axes) -> None:
+        """Outcomes a second, one on top of the other."""
         names = [name for name, count in run.outcomes.items() if count]
         edges = [part.start_s for part in run.timeline]
         widths = [part.seconds for part in run.timeline]
@@ -95,6 +98,7 @@ def sweep_curve(steps: Sequence[Step]) -> str:
     """Goodput at each rate that was tried; where it leaves the diagonal, the target no longer keeps up."""
 
     def draw(axes: Axes) -> None:
+        """What was answered in time over what was asked, one point a step."""
         ordered = sorted(steps, key=lambda step: step.rate)
         rates = [step.rate for step in ordered]
         axes.plot([0, max(rates)], [0, max(rates)], color=GRID, lw=1.5)

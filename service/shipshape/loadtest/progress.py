@@ -56,6 +56,7 @@ def progress_of(plan: Plan, title: str) -> Iterator[Watch | None]:
         task = progress.add_task(title, total=len(plan.due), counts=counts)
 
         def watch(endings: list[Ending]) -> None:
+            """Move the line on by requests that have just ended."""
             counts.add(endings)
             progress.update(task, completed=counts.ended)
 

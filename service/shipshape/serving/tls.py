@@ -55,6 +55,7 @@ class Tls:
         """A server's context that hands each new connection what the files hold by then."""
 
         def renew(connection: ssl.SSLObject, _name: str | None, _context: ssl.SSLContext) -> None:
+            """Show the newest certificate in the handshake that begins."""
             connection.context = self.newest().context
 
         context = self.newest().context

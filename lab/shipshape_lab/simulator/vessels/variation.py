@@ -23,9 +23,8 @@ def varied(nominal: Parameters, rng: np.random.Generator) -> Parameters:
         The same dataclass: numbers with a fraction scaled by 1 + SPREAD * normal, whole numbers moved by at
         most one (never below zero), flags flipped with FLIP_CHANCE.
     """
-    # Any frozen dataclass will do, which is more than the type of `fields` and `replace` can say.
-    drawn = {field.name: _drawn(getattr(nominal, field.name), rng) for field in fields(nominal)}  # type: ignore[arg-type]
-    return replace(nominal, **drawn)  # type: ignore[type-var]
+    drawn = {field.name: _drawn(getattr(nominal, field.name), rng) for field in fields(nominal)}
+    return replace(nominal, **drawn)
 
 
 def _drawn(value: Any, rng: np.random.Generator) -> Any:

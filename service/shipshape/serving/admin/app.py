@@ -32,6 +32,7 @@ def build_admin_app(control: Control, tokens: Tokens) -> FastAPI:
         return control.swap(folder)
 
     def add(path: str, handler: Any, method: str) -> None:
+        """One path; its name in the contract is that of its handler."""
         app.add_api_route(path, handler, methods=[method], operation_id=handler.__name__)
 
     add("/admin/status", control.status, "GET")
@@ -46,6 +47,7 @@ def build_admin_app(control: Control, tokens: Tokens) -> FastAPI:
 
 def _with_token(tokens: Tokens) -> Any:
     def check(request: Request) -> None:
+        """Raises Unauthenticated without a token of the file."""
         scheme, _, token = request.headers.get("authorization", "").partition(" ")
         if scheme.lower() != SCHEME or tokens.name_of(token.strip()) is None:
             raise Unauthenticated("expected a token of the admin token file in Authorization: Bearer, got none")

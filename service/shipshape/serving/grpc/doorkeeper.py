@@ -40,6 +40,7 @@ def credentials(tls: Tls) -> grpc.ServerCredentials:
 
     # The stubs forget that None is an answer: as before.
     def renewed() -> Any:
+        """What to show from now on, None as long as the files are the same."""
         nonlocal shown
         if (newest := tls.newest()) is shown:
             return None
@@ -57,6 +58,7 @@ def _configuration(material: TlsMaterial) -> grpc.ServerCertificateConfiguration
 
 def _refusal(error: Unauthenticated) -> Any:
     def end(_: Any, context: grpc.ServicerContext) -> NoReturn:
+        """Refuse the call before its message is read."""
         identify(context)
         _logger.debug("refused %s: %s", address_of(context), error)
         refuse(context, fault_of(error))

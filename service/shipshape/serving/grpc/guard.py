@@ -97,6 +97,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 
     def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
         def call(raw: bytes, context: grpc.ServicerContext) -> Any:
+            """One call: its id, its time, its share, and its refusal in our words."""
             identify(context)
             with self._metrics.request(self._of.door, method) as outcome:
                 try:
@@ -122,6 +123,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 
     def _guarded_stream(self, behaviour: StreamBehaviour, parse: Callable[[bytes], Any]) -> StreamBehaviour:
         def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Iterator[Any]:
+            """One stream; what its messages get wrong is their own answers' matter."""
             identify(context)
             set_trailing(context)
             try:

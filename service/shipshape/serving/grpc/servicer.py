@@ -96,6 +96,7 @@ def cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -
     """Drop the work when the RPC ends before it."""
 
     def cancel() -> None:
+        """The RPC has ended; does nothing to a ticket that is settled."""
         for ticket in tickets:
             ticket.cancel()
 

@@ -50,6 +50,7 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, 
     stranger = contract.problems(FaultKind.UNAUTHENTICATED)
 
     def add(path: str, handler: Any, *methods: str, **more: Any) -> None:
+        """One path; its name in the contract is that of its handler."""
         app.add_api_route(path, handler, methods=list(methods), operation_id=handler.__name__, **more)
 
     refusals |= contract.unsupported()

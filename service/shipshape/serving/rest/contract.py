@@ -71,6 +71,7 @@ def add_contract(app: FastAPI) -> None:
     """Make /openapi.json hold the schemas of the bodies too."""
 
     def openapi() -> dict[str, Any]:
+        """The contract, made once."""
         if app.openapi_schema is None:
             schema = get_openapi(
                 title=app.title, version=app.version, description=app.description, routes=app.routes

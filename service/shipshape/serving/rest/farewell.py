@@ -22,6 +22,7 @@ class Farewell:
         """Pass everything on, and add the header."""
 
         async def last(message: Any) -> None:
+            """Say with the answer's headers that the connection ends here."""
             if message["type"] == "http.response.start" and self._health.state in LEAVING:
                 message["headers"] = [*message["headers"], (b"connection", b"close")]
             await send(message)

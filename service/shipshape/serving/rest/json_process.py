@@ -103,6 +103,7 @@ class _Child:
             self._started = True
 
         def exchange() -> Any:
+            """Ask and wait; raises EOFError or OSError when the process dies."""
             self._pipe.send(request)
             self._pipe.send_bytes(body)
             return self._pipe.recv()

@@ -99,6 +99,7 @@ class Routes:
             parse = await self._parser(form, CONTACT_FORMS[form], body, request.query_params, deadline)
 
             def submit() -> tuple[Ticket[Answer], Wishes]:
+                """Parse and queue; in a thread of its own where the body is large."""
                 contact, wishes = parse()
                 return self._core.submit(model, contact, wishes, deadline), wishes
 
@@ -117,6 +118,7 @@ class Routes:
             parse = await self._parser(form, SCAN_FORMS[form], body, request.query_params, deadline)
 
             def submit() -> tuple[Sequence[str], Scan, Wishes]:
+                """Parse and queue; in a thread of its own where the body is large."""
                 parsed = parse()
                 outcome.contacts = parsed.count
                 check_contacts(parsed.count, self._core.limits)
