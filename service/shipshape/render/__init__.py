@@ -70,10 +70,11 @@ def _draw_restored(canvas: Canvas, recognition: Recognition) -> None:
     x, width = _COLUMNS[2]
     height = (_FOOT_TOP - GAP - _TOP - GAP) / 2
     upper = Rect(x, _TOP, width, height)
-    draw_restored_oblique(canvas, _panel(canvas, upper, "Restored"), recognition)
+    title = "Measured" if recognition.images is None else "Restored"
+    draw_restored_oblique(canvas, _panel(canvas, upper, title), recognition)
     draw_point_legend(canvas, upper.right - 16, upper.y + 23, recognition)
     lower = Rect(x, _TOP + height + GAP, width, height)
-    draw_restored_from_above(canvas, _panel(canvas, lower, "Restored from above, box and bow"), recognition)
+    draw_restored_from_above(canvas, _panel(canvas, lower, f"{title} from above, box and bow"), recognition)
 
 
 def _draw_foot(canvas: Canvas, recognition: Recognition) -> None:
