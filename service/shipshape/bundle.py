@@ -60,11 +60,21 @@ def load_bundle(path: Path) -> Bundle:
     """
     content = _read_manifest(path)
     spec = _parse_manifest(content)
+    return _bundle(content, spec, {name: _load_model(path, model) for name, model in spec.models.items()})
+
+
+def read_bundle(path: Path) -> Bundle:
+    """The same without its networks, which are not looked at; raises BundleError for the manifest alone."""
+    content = _read_manifest(path)
+    return _bundle(content, _parse_manifest(content), {})
+
+
+def _bundle(content: bytes, spec: "_ManifestSpec", models: Mapping[str, OnnxModel]) -> Bundle:
     return Bundle(
         name=spec.name,
         digest=hashlib.sha256(content).hexdigest(),
         catalogue=tuple(vessel.to_vessel() for vessel in spec.catalogue),
-        models=_Table("models", {name: _load_model(path, model) for name, model in spec.models.items()}),
+        models=_Table("models", models),
         parameters=_Table("parameters", spec.parameters),
         scores=spec.scores,
         training=spec.training,

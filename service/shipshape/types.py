@@ -75,6 +75,11 @@ class Options:
     image_method: ImageMethod = ImageMethod.FULL_SIDE  # used by preset `paper` alone
     lowest_rung: Rung = Rung.HEADING_AND_BOX  # the cheapest answer that is better than none
 
+    def accepts(self, rung: Rung) -> bool:
+        """Whether an answer on this rung is better than none."""
+        rungs = list(Rung)
+        return rungs.index(rung) <= rungs.index(self.lowest_rung)
+
 
 @dataclass(frozen=True, slots=True)
 class ReferenceBox:

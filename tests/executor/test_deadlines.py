@@ -9,7 +9,7 @@ from serving.fakes import until
 from shipshape.errors import DeadlineExceeded
 from shipshape.executor import Executor
 from shipshape.executor.deadlines import FEW, Deadlines
-from shipshape.executor.executor import WEDGED_S
+from shipshape.executor.crew import WEDGED_S
 from shipshape.executor.ticket import Ticket
 
 

@@ -10,17 +10,13 @@ import threading
 import time
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 
-from shipshape.bundle import load_bundle
 from shipshape.errors import BundleError, Cancelled
-from shipshape.pipeline import Pipeline
-from shipshape.render import render_png
-from shipshape.serving.core import Model
+from shipshape.serving.model import Model
+from shipshape.serving.remote_model import RemoteModel
 from shipshape.serving.service import Addresses, Service
 from shipshape.settings import Settings
 from shipshape.telemetry import configure_logging
-from shipshape.validation import ContactLimits
 
 _logger = logging.getLogger(__name__)
 OK, FAILED, UNUSABLE = 0, 1, 2  # exit codes, as `cli` lists them
@@ -43,10 +39,10 @@ def serve(settings: Settings) -> int:
     ends: queue.SimpleQueue[End] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda received, frame: ends.put(received))
-    load = partial(_load, limits=ContactLimits(max_points=settings.max_points))
+    load = partial(RemoteModel, max_points=settings.max_points, log_level=settings.log_level)
     try:
         model = load(settings.bundle)
-        service = Service(settings, render_png, load=load, on_death=lambda: ends.put(None))
+        service = Service(settings, load=load, on_death=lambda: ends.put(None))
         addresses = service.start()
     except (BundleError, OSError) as error:
         return _failed(error, str(error))
@@ -57,11 +53,6 @@ def serve(settings: Settings) -> int:
         return _failed(ended_by, f"expected bundle {name} to answer the built-in contact, got {ended_by!r}")
     _logger.info("stopped")
     return FAILED if ended_by is None else OK
-
-
-def _load(folder: Path, limits: ContactLimits) -> Model:
-    bundle = load_bundle(folder)
-    return Model(bundle, Pipeline(bundle, limits))
 
 
 def _run(

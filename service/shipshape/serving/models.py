@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shipshape.errors import BundleError, Cancelled, Conflict
-from shipshape.serving.core import Model
+from shipshape.serving.model import Model
 
 Load = Callable[[Path], Model]  # raises BundleError
 

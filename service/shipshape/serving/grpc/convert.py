@@ -1,6 +1,6 @@
 """Messages of shipshape.v1 <-> the core's own values; units and frames are the same on both sides."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, TypeVar
 
@@ -10,7 +10,7 @@ from jaxtyping import UInt8
 from shipshape.budget import Report
 from shipshape.errors import InvalidInput
 from shipshape.executor import Lane
-from shipshape.serving.core import Answer, Capacity, Model
+from shipshape.serving.core import Capacity
 from shipshape.serving.encoding import (
     Limits,
     Wishes,
@@ -21,6 +21,7 @@ from shipshape.serving.encoding import (
     points_from_bytes,
 )
 from shipshape.serving.faults import Fault, FaultKind
+from shipshape.serving.model import Answer, Model, Reply
 from shipshape.types import Box, Contact, ImageMethod, Options, Preset, Reason, RestoredCloud, Rung
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -125,25 +126,40 @@ def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
     return message
 
 
-def from_outcomes(
-    contact_ids: Iterable[str], outcomes: Sequence[Answer | Fault], wishes: Wishes
-) -> pb.RecogniseScanResponse:
-    """The message of a scan's outcomes, in the order of its contacts."""
-    response = pb.RecogniseScanResponse()
-    add_results(response.results, contact_ids, outcomes, wishes)
-    return response
+def encode_single(answer: Answer, wishes: Wishes) -> bytes:
+    """The bytes of a RecogniseResponse; on the worker."""
+    return pb.RecogniseResponse(recognition=from_answer(answer, wishes)).SerializeToString()
 
 
-def add_results(
-    results: Any, contact_ids: Iterable[str], outcomes: Sequence[Answer | Fault], wishes: Wishes
-) -> None:
-    """Put the outcomes into the repeated ContactResult of a message, in the order of its contacts."""
+def encode_in_scan(answer: Answer, wishes: Wishes) -> bytes:
+    """The bytes of a RecogniseScanResponse with this result alone; on the worker."""
+    return pb.RecogniseScanResponse(results=[_result(answer, wishes)]).SerializeToString()
+
+
+def encode_in_stream(answer: Answer, wishes: Wishes) -> bytes:
+    """The bytes of a RecogniseStreamResponse with this result alone; on the worker."""
+    return pb.RecogniseStreamResponse(results=[_result(answer, wishes)]).SerializeToString()
+
+
+def joined(
+    response: Callable[..., Any], contact_ids: Iterable[str], outcomes: Sequence[Reply[bytes] | Fault]
+) -> bytes:
+    """The bytes of one `response` with the results of all outcomes, in the order of the contacts.
+
+    The bytes of messages one after the other are those of the message with the repeated fields of all.
+    """
+    parts = []
     for contact_id, outcome in zip(contact_ids, outcomes, strict=True):
-        result = results.add(contact_id=contact_id)
         if isinstance(outcome, Fault):
-            result.error.CopyFrom(from_fault(outcome))
+            result = pb.ContactResult(contact_id=contact_id, error=from_fault(outcome))
+            parts.append(response(results=[result]).SerializeToString())
         else:
-            result.recognition.CopyFrom(from_answer(outcome, wishes))
+            parts.append(outcome.content)
+    return b"".join(parts)
+
+
+def _result(answer: Answer, wishes: Wishes) -> pb.ContactResult:
+    return pb.ContactResult(contact_id=answer.contact.contact_id, recognition=from_answer(answer, wishes))
 
 
 def from_fault(fault: Fault) -> pb.ContactError:

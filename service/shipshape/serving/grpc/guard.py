@@ -16,8 +16,7 @@ from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.serving.grpc.callers import client_of
 from shipshape.serving.oip.models import UnknownModel
-from shipshape.telemetry import DEGRADED, SCAN, SINGLE, STREAM, Metrics, Outcome, new_request_id, request_id
-from shipshape.types import Rung
+from shipshape.telemetry import SCAN, SINGLE, STREAM, Metrics, Outcome, new_request_id, request_id
 from shipshape.v1 import shipshape_pb2 as pb
 
 STATUS = {
@@ -88,11 +87,11 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         if handler.request_streaming:
             return grpc.stream_stream_rpc_method_handler(
                 self._guarded_stream(handler.stream_stream, handler.request_deserializer),
-                response_serializer=handler.response_serializer,
+                response_serializer=_serialized,
             )
         return grpc.unary_unary_rpc_method_handler(
             self._guarded(handler.unary_unary, handler.request_deserializer, method),
-            response_serializer=handler.response_serializer,
+            response_serializer=_serialized,
         )
 
     def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
@@ -115,8 +114,6 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     outcome.kind = fault.kind
                     unknown = isinstance(error, UnknownModel)
                     refuse(context, fault, grpc.StatusCode.NOT_FOUND if unknown else None)
-                if method == SINGLE and response.recognition.rung != Rung.FULL:
-                    outcome.kind = DEGRADED
                 return response
 
         return call
@@ -162,6 +159,11 @@ def refuse(context: grpc.ServicerContext, fault: Fault, status: grpc.StatusCode 
     set_trailing(context, *entries)
     context.abort(status or STATUS[fault.kind], fault.message)
     raise AssertionError("unreachable: abort raises")
+
+
+def _serialized(response: Any) -> bytes:
+    """The response, unless a worker has encoded it already."""
+    return response if isinstance(response, bytes) else response.SerializeToString()
 
 
 def _parsed(raw: bytes, parse: Callable[[bytes], Any], service: str) -> Any:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from shipshape.errors import InvalidInput
-from shipshape.serving.core import Answer
 from shipshape.serving.faults import Fault
+from shipshape.serving.model import Answer, Reply
 from shipshape.serving.oip.convention import CONTACT_ID
 from shipshape.serving.oip.tensors import NUMPY, Datatype, Tensor, TensorSpec
 from shipshape.types import Recognition
@@ -64,11 +64,14 @@ def output_specs(names: Sequence[str]) -> list[TensorSpec]:
 
 
 def to_tensors(
-    specs: Sequence[TensorSpec], contact_ids: Sequence[str], outcomes: Sequence[Answer | Fault], classes: int
+    specs: Sequence[TensorSpec],
+    contact_ids: Sequence[str],
+    outcomes: Sequence[Reply[Answer] | Fault],
+    classes: int,
 ) -> list[Tensor]:
     """The outputs `specs`; `classes` is how many columns the probabilities have."""
     faults = [outcome if isinstance(outcome, Fault) else None for outcome in outcomes]
-    found = [None if isinstance(outcome, Fault) else outcome.recognition for outcome in outcomes]
+    found = [None if isinstance(outcome, Fault) else outcome.content.recognition for outcome in outcomes]
     beside = {
         CONTACT_ID: contact_ids,
         ERROR: [fault.kind if fault else "" for fault in faults],

@@ -11,10 +11,11 @@ from starlette.routing import Route
 
 from shipshape.errors import NotReady
 from shipshape.serving.clients import Clients
-from shipshape.serving.core import Core, Model
+from shipshape.serving.core import Core
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.serving.health import Health
 from shipshape.serving.load_report import HTTP_HEADER, as_text
+from shipshape.serving.model import Model
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import Inference, submit
 from shipshape.serving.rest.bodies import Bodies

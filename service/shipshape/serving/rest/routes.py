@@ -8,10 +8,11 @@ from starlette.concurrency import run_in_threadpool
 
 from shipshape.executor import Lane, Ticket
 from shipshape.serving.clients import Clients, Share
-from shipshape.serving.core import Answer, Core, Scan, conclude, outcome_of
+from shipshape.serving.core import Core, Scan, conclude, outcome_of
 from shipshape.serving.encoding import Wishes, check_contacts
 from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.load_report import HTTP_HEADER, as_text
+from shipshape.serving.model import Order, Reply
 from shipshape.serving.rest import answers
 from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.headers import media_type, timeout_s
@@ -98,17 +99,17 @@ class Routes:
         async with self._bodies.read(request, seconds) as body:
             parse = await self._parser(form, CONTACT_FORMS[form], body, request.query_params, deadline)
 
-            def submit() -> tuple[Ticket[Answer], Wishes]:
+            def submit() -> tuple[Ticket[Reply[bytes]], Wishes]:
                 """Parse and queue; in a thread of its own where the body is large."""
                 contact, wishes = parse()
-                return self._core.submit(model, contact, wishes, deadline), wishes
+                return self._core.submit(model, Order(contact, wishes, answers.encode), deadline), wishes
 
             ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         outcome.urgent = wishes.lane is not Lane.BATCH
         await until_settled([ticket], request)
-        answer = ticket.result()
-        outcome.kind = outcome_of(answer)
-        return await _run(lambda: self._single(answer, wishes), small=not _bulky(wishes))
+        reply = ticket.result()
+        outcome.kind = outcome_of(reply)
+        return self._timed(reply.content, reply.stage_ms)
 
     async def _scan(self, request: Request, outcome: Outcome, share: Share) -> Response:
         model, seconds = self._core.model(), self._timeout(request)
@@ -117,20 +118,20 @@ class Routes:
         async with self._bodies.read(request, seconds) as body:
             parse = await self._parser(form, SCAN_FORMS[form], body, request.query_params, deadline)
 
-            def submit() -> tuple[Sequence[str], Scan, Wishes]:
+            def submit() -> tuple[Sequence[str], Scan[bytes], Wishes]:
                 """Parse and queue; in a thread of its own where the body is large."""
                 parsed = parse()
                 outcome.contacts = parsed.count
                 check_contacts(parsed.count, self._core.limits)
                 share.take(parsed.count)
-                scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, deadline)
+                scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, answers.encode, deadline)
                 return parsed.contact_ids, scan, parsed.wishes
 
             ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         outcome.urgent = wishes.lane is not Lane.BATCH
         await until_settled(scan.tickets, request)
-        small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
-        return await _run(lambda: self._many(ids, scan, wishes), small=small)
+        outcomes, stage_ms = conclude(scan, "rest", self._metrics)
+        return self._timed(answers.joined(ids, outcomes), stage_ms)
 
     async def _parser(
         self, form: str, parse: Parse[T], body: bytes, query: Mapping[str, str], deadline: float
@@ -150,13 +151,6 @@ class Routes:
         capacity = self._core.capacity(asked.points, asked.lane)
         return _json(answers.to_bytes(answers.from_capacity(capacity, self._metrics.budget.report())))
 
-    def _many(self, ids: Sequence[str], scan: Scan, wishes: Wishes) -> Response:
-        outcomes, stage_ms = conclude(scan, "rest", self._metrics)
-        return self._timed(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), stage_ms)
-
-    def _single(self, answer: Answer, wishes: Wishes) -> Response:
-        return self._timed(answers.to_bytes(answers.from_answer(answer, wishes)), answer.recognition.stage_ms)
-
     def _timed(self, content: bytes, stage_ms: Mapping[str, float]) -> Response:
         headers = {"Server-Timing": server_timing(stage_ms), HTTP_HEADER: as_text(self._core.load())}
         return Response(content, headers=headers, media_type=JSON)
@@ -168,10 +162,6 @@ class Routes:
 async def _run(work: Callable[[], T], *, small: bool) -> T:
     """Do the work here if it takes less than handing it to a thread, else where it holds nobody up."""
     return work() if small else await run_in_threadpool(work)
-
-
-def _bulky(wishes: Wishes) -> bool:
-    return wishes.restored or wishes.images or wishes.png
 
 
 def _json(content: bytes) -> Response:
