@@ -1,6 +1,7 @@
 """Environment -> frozen settings; every one has a default that works, and a wrong one stops the start."""
 
 import os
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
@@ -9,7 +10,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from shipshape.errors import SettingsError
 
-__all__ = ["PREFIX", "Settings", "SettingsError", "default_bundle", "load_settings"]
+__all__ = ["PREFIX", "Compute", "Settings", "SettingsError", "default_bundle", "load_settings"]
 
 PREFIX = "SHIPSHAPE_"
 
@@ -18,6 +19,13 @@ def default_bundle() -> Path:
     """`models` in the current directory, else that of the source checkout this package runs from."""
     here, checkout = Path("models"), Path(__file__).resolve().parents[2] / "models"
     return checkout if not here.is_dir() and checkout.is_dir() else here
+
+
+class Compute(StrEnum):
+    """Where contacts are computed."""
+
+    PROCESSES = "processes"
+    THREADS = "threads"
 
 
 class Settings(BaseSettings):
@@ -39,8 +47,13 @@ class Settings(BaseSettings):
         0,
         ge=0,
         le=1024,
-        description="Threads that compute; 0 is one a usable core. More of them share the same cores: "
+        description="Processes or threads that compute; 0 is one a usable core. More of them share the same cores: "
         "higher latency, no more throughput.",
+    )
+    compute: Compute = Field(
+        Compute.PROCESSES,
+        description="Where contacts are computed: in `processes` forked from one that holds the bundle, each with "
+        "an interpreter for itself, or in `threads` of the service, which share one: less memory, slower.",
     )
     queue_limit: int = Field(
         512,

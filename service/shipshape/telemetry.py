@@ -4,9 +4,9 @@ import asyncio
 import collections
 import json
 import logging
+import random
 import sys
 import time
-import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -17,6 +17,7 @@ from typing import Protocol
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector
 
 from shipshape.budget import WINDOWS, Budget, Level
+from shipshape.histogram import BulkHistogram
 
 # Seconds, but those of requests: shares of the budget.
 STAGE_BUCKETS = (5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3, 25e-3, 50e-3, 0.1, 0.4, 1.6)
@@ -37,7 +38,7 @@ _logger = logging.getLogger(__name__)
 def new_request_id(proposed: str = "") -> str:
     """The caller's own id if it is harmless in a log, else a fresh one; set for the current context."""
     harmless = 0 < len(proposed) <= 64 and all(char.isalnum() or char in "-_.:" for char in proposed)
-    chosen = proposed if harmless and proposed.isascii() else uuid.uuid4().hex[:16]
+    chosen = proposed if harmless and proposed.isascii() else f"{random.getrandbits(64):016x}"
     request_id.set(chosen)
     return chosen
 
@@ -57,6 +58,10 @@ class Metrics:
     Args:
         registry: Holds them.
         budget: Told of every answer; the buckets of request times lie around it.
+
+    Attributes:
+        observe_stage: Told the name of a stage that ran, and its seconds.
+        observe_wait: Told the lane of a contact that was taken up, and the seconds that it had waited.
     """
 
     def __init__(self, registry: CollectorRegistry, budget: Budget) -> None:
@@ -64,15 +69,16 @@ class Metrics:
         self.budget = budget
         histogram, counter = partial(Histogram, registry=registry), partial(Counter, registry=registry)
         gauge = partial(Gauge, registry=registry)
-        self._stage = histogram("shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS)
+        bulk = partial(BulkHistogram, buckets=STAGE_BUCKETS, registry=registry)
+        self.observe_stage = bulk("shipshape_stage_seconds", "Time of one stage.", "stage").observe
+        self.observe_wait = bulk(
+            "shipshape_queue_seconds", "Time that a contact waited for a worker.", "lane"
+        ).observe
         self._request = histogram(
             "shipshape_request_seconds",
             "Time of one request at the door, whatever the outcome.",
             ["door", "method", "outcome"],
             buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
-        )
-        self._wait = histogram(
-            "shipshape_queue_seconds", "Time that a contact waited for a worker.", ["lane"], buckets=STAGE_BUCKETS
         )
         self._age = histogram(
             "shipshape_age_seconds",
@@ -94,18 +100,10 @@ class Metrics:
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
         ProcessCollector(registry=registry)
 
-    def observe_stage(self, stage: str, seconds: float) -> None:
-        """One stage ran; seconds."""
-        self._stage.labels(stage).observe(seconds)
-
     def count_contacts(self, door: str, outcomes: Iterable[str]) -> None:
         """Contacts of a scan were answered ("ok") or refused (the kind of the error)."""
         for outcome, count in collections.Counter(outcomes).items():
             self._contacts.labels(door, outcome).inc(count)
-
-    def observe_wait(self, lane: str, seconds: float) -> None:
-        """A contact of this lane waited; seconds."""
-        self._wait.labels(lane).observe(seconds)
 
     def observe_age(self, seconds: float) -> None:
         """The points of a request were this old; seconds."""

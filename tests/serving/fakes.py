@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipshape.bundle import Bundle, CatalogueVessel
-from shipshape.serving.core import Model
+from shipshape.serving.local_model import LocalModel
 from shipshape.serving.service import Service
 from shipshape.settings import Settings
 from shipshape.types import (
@@ -168,6 +168,10 @@ def image_methods():
     return list(ImageMethod)
 
 
+def fake_model(pipeline, **fields):
+    return LocalModel(replace(FAKE_BUNDLE, **fields), pipeline, lambda contact, recognition: PNG)
+
+
 @contextmanager
 def running(*, opened=True, load=None, **settings):
     """A service around a fresh fake pipeline on free ports; `load` reads bundles for a swap."""
@@ -182,13 +186,12 @@ def running(*, opened=True, load=None, **settings):
     }
     service = Service(
         Settings(**settings),
-        lambda contact, recognition: PNG,
         load=load,
         on_death=lambda: pytest.fail("a door died"),
     )
     addresses = service.start()
     if opened:
-        service.open(Model(FAKE_BUNDLE, pipeline))
+        service.open(fake_model(pipeline))
     channel = grpc.insecure_channel(f"127.0.0.1:{addresses.grpc_port}")
     rest = httpx.Client(base_url=f"http://127.0.0.1:{addresses.rest_port}", timeout=PATIENCE, trust_env=False)
     with channel, rest:

@@ -7,15 +7,16 @@ how it is reached in `crew` and `process_crew`.
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from shipshape.errors import NotReady, Overloaded
 from shipshape.executor.admission import HEADROOM, settle_rungs
 from shipshape.executor.costs import Costs
-from shipshape.executor.counts import Counts, outcome_of
+from shipshape.executor.counts import Counts
 from shipshape.executor.crew import Crew, Hand, ThreadCrew
 from shipshape.executor.deadlines import Deadlines
 from shipshape.executor.entry import Entry
@@ -78,11 +79,11 @@ class Executor:
         if not entries:
             return []
         with self._lock:
-            self._counts = self._counts.plus("offered", len(entries))
+            self._counts.offered += len(entries)
             try:
                 self._admit(entries)
             except Exception:
-                self._counts = self._counts.plus("refused", len(entries))
+                self._counts.refused += len(entries)
                 raise
             now = self.clock()
             for entry in entries:
@@ -119,7 +120,7 @@ class Executor:
     def counts(self) -> Counts:
         """What became of the tasks so far."""
         with self._lock:
-            return self._counts
+            return replace(self._counts)
 
     def promise(self, rung: Rung[Any], size: float, lane: Lane) -> float:
         """Seconds in which new work of this size and lane would be answered on this rung, as admission sees it."""
@@ -140,8 +141,7 @@ class Executor:
     def queue_depth(self) -> int:
         """Tasks that wait for a worker."""
         with self._lock:
-            given = (sum(not entry.ticket.settled for entry in hand.given.values()) for hand in self._hands())
-            return len(self._queues) + sum(max(0, count - 1) for count in given)
+            return len(self._queues) + sum(map(_waiting, self._hands()))
 
     @property
     def queue_age(self) -> float:
@@ -206,9 +206,10 @@ class Executor:
             if not hand.given:
                 self._idle.notify_all()
 
-    def stage_ran(self, name: str, seconds: float) -> None:
-        """A stage ran in a worker that cannot tell so itself."""
-        self._on_stage(name, seconds)
+    def stages_ran(self, stage_ms: Mapping[str, float]) -> None:
+        """Stages ran in a worker that cannot tell so itself."""
+        for name, milliseconds in stage_ms.items():
+            self._on_stage(name, milliseconds / 1e3)
 
     def give_out(self) -> None:
         """A worker has come."""
@@ -266,10 +267,16 @@ class Executor:
         return self._threads
 
     def _settled(self, entry: Entry, future: Future[Any]) -> None:
-        outcome = outcome_of(entry.ticket)
         with self._lock:
-            self._counts = self._counts.plus(outcome, 1)
+            self._counts.settle(entry.ticket)
             if self._queues.remove(entry.task.lane, entry):  # left or expired before a worker came
                 self._idle.notify_all()
             elif not entry.over and isinstance(entry.hand, Hand):
                 entry.hand.take_back(entry)
+
+
+def _waiting(hand: Hand) -> int:
+    """How many entries of a worker wait for it."""
+    if len(hand.given) <= 1:
+        return 0
+    return max(0, sum(not entry.ticket.settled for entry in hand.given.values()) - 1)

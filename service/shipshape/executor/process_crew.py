@@ -11,7 +11,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -44,8 +44,8 @@ class Owner(Protocol):
         """A worker has come."""
         ...
 
-    def stage_ran(self, name: str, seconds: float) -> None:
-        """A stage ran."""
+    def stages_ran(self, stage_ms: Mapping[str, float]) -> None:
+        """Stages ran, each for so many milliseconds."""
         ...
 
 
@@ -103,7 +103,9 @@ class ProcessCrew(Crew):
         """End the workers; whoever still waits for one of them is told so."""
         self._closing = True
         self._wake()
-        if self._thread.ident is not None and threading.current_thread() is not self._thread:
+        if self._thread.ident is None:
+            self._release()
+        elif threading.current_thread() is not self._thread:
             self._thread.join()
         self._server.end()
 
@@ -122,6 +124,9 @@ class ProcessCrew(Crew):
             self._look_after()
         for hand in self.hands:
             self._let_go(hand)
+        self._release()
+
+    def _release(self) -> None:
         self._selector.close()
         self._woken.close()
         self._waker.close()
@@ -156,8 +161,7 @@ class ProcessCrew(Crew):
     def _end(self, hand: ProcessHand, report: Report) -> None:
         entry = hand.given[report.number]
         entry.began, entry.over = report.began, True
-        for name, milliseconds in report.stage_ms.items():
-            self._owner.stage_ran(name, milliseconds / 1e3)
+        self._owner.stages_ran(report.stage_ms)
         if isinstance(report.result, Exception):
             entry.ticket.fail(report.result)
         else:

@@ -13,7 +13,8 @@ from shipshape.executor.entry import Entry
 from shipshape.executor.lanes import UP_TO, Lane
 from shipshape.executor.messages import Inbox, packed
 
-SOON_S = 0.005  # of work before it, at which an entry is given to a worker that is busy: it need not wait for us
+SOON_S = 0.008  # of work before it, at which an entry is given to a worker that is busy: it need not wait for us
+MOST = 4  # entries that it is given at a time
 
 
 class ProcessHand(Hand):
@@ -49,7 +50,7 @@ class ProcessHand(Hand):
         if not self.alive:
             return False
         ahead = [entry.left for entry in self.given.values() if entry.task.lane in UP_TO[lane]]
-        return not ahead or (len(ahead) == 1 and ahead[0] <= SOON_S)
+        return not ahead or (len(ahead) < MOST and sum(ahead) <= SOON_S)
 
     def is_stuck(self, now: float) -> bool:
         """Whether it has work and has said nothing for `WEDGED_S`."""

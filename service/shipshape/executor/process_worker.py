@@ -13,10 +13,12 @@ from typing import Any, NamedTuple, NoReturn
 from shipshape.errors import ShipshapeError
 from shipshape.executor.costs import Costs
 from shipshape.executor.entry import Entry
+from shipshape.executor.lanes import Lane
 from shipshape.executor.messages import Inbox, packed
 from shipshape.executor.ticket import Task
 from shipshape.executor.worker import Worker
 
+HOLD_S = 0.004  # at most, for a report to be sent with the next: while all is busy, the service is woken less
 LEARNED = 4  # one in so many entries is learned from: costs change slowly, and learning takes time
 
 
@@ -83,12 +85,16 @@ class SocketMailbox:
         self._prepared = prepared
         self._inbox = Inbox()
         self._ended = 0
+        self._reports: list[bytes] = []  # that are not sent yet
+        self._held_since = 0.0
         self._entries: dict[int, Entry] = {}
         self._poll = select.poll()
         self._poll.register(connection, select.POLLIN)
 
     def read(self, *, wait: bool) -> Sequence[Entry] | None:
         """As `Mailbox.read`."""
+        if wait or (self._reports and time.monotonic() - self._held_since > HOLD_S):
+            self._send()
         if not wait and not self._poll.poll(0):
             return ()
         messages = self._inbox.receive(self._connection)
@@ -110,14 +116,26 @@ class SocketMailbox:
                 self._prepared.costs.learn(timed, entry.task.size, seconds)
         error = entry.ticket.future.exception()
         result = entry.ticket.future.result() if error is None else as_message(error)
-        self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, entry.seconds))
+        self._tell(
+            Report(number, result, entry.place, entry.stage_ms, entry.began, entry.seconds), entry.task.lane
+        )
 
-    def _tell(self, report: Report) -> None:
+    def _tell(self, report: Report, lane: Lane = Lane.COLLISION) -> None:
+        """Send a report, or hold it back for a moment while there is more work that is no more urgent."""
         try:
             message = packed(report)
         except Exception as error:  # an answer that cannot travel
             message = packed(Report(report.number, as_message(error)))
-        self._connection.sendall(message)
+        if not self._reports:
+            self._held_since = time.monotonic()
+        self._reports.append(message)
+        if not self._entries or lane is Lane.COLLISION:
+            self._send()
+
+    def _send(self) -> None:
+        if self._reports:
+            self._connection.sendall(b"".join(self._reports))
+            self._reports.clear()
 
     def _taken(self, number: int, *given: Any) -> Entry | None:
         if not given:  # taken back

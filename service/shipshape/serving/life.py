@@ -10,12 +10,13 @@ import threading
 import time
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 
 from shipshape.errors import BundleError, Cancelled
 from shipshape.serving.model import Model
 from shipshape.serving.remote_model import RemoteModel
 from shipshape.serving.service import Addresses, Service
-from shipshape.settings import Settings
+from shipshape.settings import Compute, Settings
 from shipshape.telemetry import configure_logging
 
 _logger = logging.getLogger(__name__)
@@ -39,7 +40,7 @@ def serve(settings: Settings) -> int:
     ends: queue.SimpleQueue[End] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda received, frame: ends.put(received))
-    load = partial(RemoteModel, max_points=settings.max_points, log_level=settings.log_level)
+    load = partial(load_model, settings)
     try:
         model = load(settings.bundle)
         service = Service(settings, load=load, on_death=lambda: ends.put(None))
@@ -49,10 +50,24 @@ def serve(settings: Settings) -> int:
     _logger.info("live on REST port %d, gRPC port %d", addresses.rest_port, addresses.grpc_port)
     ended_by = _run(service, model, addresses, ends, settings.linger_s)
     if isinstance(ended_by, Exception):
-        name = model.bundle.name
-        return _failed(ended_by, f"expected bundle {name} to answer the built-in contact, got {ended_by!r}")
+        return _failed(ended_by, _why(ended_by, model))
     _logger.info("stopped")
     return FAILED if ended_by is None else OK
+
+
+def load_model(settings: Settings, folder: Path) -> Model:
+    """The bundle in `folder`, to compute where the settings say; raises BundleError."""
+    if settings.compute is Compute.PROCESSES:
+        return RemoteModel(folder, settings.max_points, settings.log_level)
+    from shipshape.serving.prepare import load_local  # noqa: PLC0415  # large: only who computes here pays for it
+
+    return load_local(folder, settings.max_points)
+
+
+def _why(error: Exception, model: Model) -> str:
+    if isinstance(error, BundleError):
+        return str(error)
+    return f"expected bundle {model.bundle.name} to answer the built-in contact, got {error!r}"
 
 
 def _run(

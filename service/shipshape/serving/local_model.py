@@ -33,7 +33,7 @@ class LocalModel:
             recognition = self.pipeline.finish(work, ended.stage_ms, Rung(ended.rung), ended.why)
             png = self.render(order.contact, recognition) if order.wishes.png else None
             content = order.encode(Answer(order.contact, recognition, png), order.wishes)
-            return Reply(content, recognition.rung, recognition.stage_ms)
+            return Reply(content, recognition.rung, ended.stage_ms)
 
         return Task(
             self.pipeline.ladder(order.wishes.options),

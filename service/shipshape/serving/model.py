@@ -30,6 +30,10 @@ class Reply(Generic[C]):
     rung: Rung
     stage_ms: Mapping[str, float]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """One comes with every contact, and dataclasses with slots are slow to pickle."""
+        return Reply, (self.content, self.rung, self.stage_ms)
+
 
 Encode = Callable[[Answer, Wishes], C]  # a function of a module, so that it can be named to a worker process
 

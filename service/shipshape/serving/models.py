@@ -93,6 +93,7 @@ class Models:
         try:
             model = self._load(folder)
             if model.bundle.digest == before.model.bundle.digest:
+                model.close()
                 return before
             self._try_out(model)
         except (BundleError, Cancelled):

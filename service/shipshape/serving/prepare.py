@@ -1,6 +1,5 @@
 """What the process that forks workers does before: bundle -> pipeline -> tried out -> told to the service."""
 
-import pickle
 import time
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from shipshape.sample import sample_contact
 from shipshape.serving.description import Description
 from shipshape.serving.grpc import convert
 from shipshape.serving.local_model import LocalModel
+from shipshape.serving.order_wire import Wire, from_wire
 from shipshape.serving.rest import answers
 from shipshape.telemetry import configure_logging
 from shipshape.types import Options, Preset
@@ -52,9 +52,9 @@ def prepare(folder: Path, digest: str, max_points: int, log_level: str) -> Prepa
     costs = Costs()
     model.try_out(lambda task: rehearse(task, costs, time.monotonic), lambda: False, ENCODERS)
 
-    def make(order: bytes, deadline: float) -> Task[Any, Any]:
+    def make(order: Wire, deadline: float) -> Task[Any, Any]:
         """What the service ordered."""
-        return model.task(pickle.loads(order), deadline)
+        return model.task(from_wire(order), deadline)
 
     return Prepared(_describe(model, costs), make, costs)
 

@@ -1,6 +1,6 @@
 """A model that computes in worker processes; the service itself holds neither networks nor compiled loops."""
 
-import pickle
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,7 @@ from shipshape.bundle import read_bundle
 from shipshape.executor import Ended, Executor, ProcessCrew, Task
 from shipshape.serving.description import Description
 from shipshape.serving.model import Order, Reply
+from shipshape.serving.order_wire import to_wire
 from shipshape.types import Options, Preset, Rung
 
 C = TypeVar("C")
@@ -68,14 +69,13 @@ class RemoteModel:
         self.bundle = read_bundle(folder)
         self.pipeline: RemotePipeline
         self._crew = ProcessCrew(PREPARE, folder, self.bundle.digest, max_points, log_level)
-        self._executor: Executor | None = None
 
     def task(self, order: Order[C], deadline: float) -> Task[Any, Reply[C]]:
         """As `Model.task`; what is wrong with the points is found by the worker."""
         return Task(
             self.pipeline.ladder(order.wishes.options),
-            pickle.dumps(order, pickle.HIGHEST_PROTOCOL),
-            _not_here,
+            to_wire(order),
+            self._not_here,
             deadline,
             order.wishes.lane,
             size=len(order.contact.points_level),
@@ -84,19 +84,26 @@ class RemoteModel:
 
     def start(self, executor: Executor, stopping: Callable[[], bool]) -> None:
         """As `Model.start`; the processes have tried the bundle out before they say that they are prepared."""
-        description: Description = self._crew.prepared(stopping)
+        try:
+            description: Description = self._crew.prepared(stopping)
+        except BaseException:
+            self._crew.close()
+            raise
         self.pipeline = RemotePipeline(description)
         executor.learn(self.pipeline.costs, description.size)
         self._crew.start(executor, executor.workers)
         executor.join(self._crew)
-        self._executor = executor
+        # When it was replaced, and the last request that began with it has its answer, nobody knows it any more.
+        weakref.finalize(self, _end, executor, self._crew)
 
     def close(self) -> None:
-        """End the processes."""
-        if self._executor is not None:
-            self._executor.leave(self._crew)
+        """It is not needed after all."""
         self._crew.close()
 
+    def _not_here(self, work: Any, ended: Ended) -> NoReturn:  # of the model, which so lives as long as its tasks
+        raise NotImplementedError("answers are made in a worker process")
 
-def _not_here(work: Any, ended: Ended) -> NoReturn:
-    raise NotImplementedError("answers are made in a worker process")
+
+def _end(executor: Executor, crew: ProcessCrew) -> None:
+    executor.leave(crew)
+    crew.close()

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
 
-import cv2
 import numpy as np
 import orjson
 from jaxtyping import UInt8
@@ -133,6 +132,8 @@ def _images(images: ImagePair) -> Json:
 
 
 def _png(image: UInt8[np.ndarray, "rows columns 3"]) -> bytes:
+    import cv2  # noqa: PLC0415  # on the worker alone: the service itself need not hold it
+
     written, encoded = cv2.imencode(".png", image)
     if not written:
         raise RuntimeError(f"cv2 could not encode an image of shape {image.shape}")
