@@ -4,14 +4,14 @@ import asyncio
 import collections
 import json
 import logging
+import secrets
 import sys
 import time
-import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Protocol
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector
@@ -37,7 +37,7 @@ _logger = logging.getLogger(__name__)
 def new_request_id(proposed: str = "") -> str:
     """The caller's own id if it is harmless in a log, else a fresh one; set for the current context."""
     harmless = 0 < len(proposed) <= 64 and all(char.isalnum() or char in "-_.:" for char in proposed)
-    chosen = proposed if harmless and proposed.isascii() else uuid.uuid4().hex[:16]
+    chosen = proposed if harmless and proposed.isascii() else secrets.token_hex(8)
     request_id.set(chosen)
     return chosen
 
@@ -64,31 +64,47 @@ class Metrics:
         self.budget = budget
         histogram, counter = partial(Histogram, registry=registry), partial(Counter, registry=registry)
         gauge = partial(Gauge, registry=registry)
-        self._stage = histogram("shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS)
-        self._request = histogram(
-            "shipshape_request_seconds",
-            "Time of one request at the door, whatever the outcome.",
-            ["door", "method", "outcome"],
-            buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
+        # Of a metric with labels, its child by their values: kept, for finding one takes a lock and a detour.
+        self._stage = cache(
+            histogram("shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS).labels
         )
-        self._wait = histogram(
-            "shipshape_queue_seconds", "Time that a contact waited for a worker.", ["lane"], buckets=STAGE_BUCKETS
+        self._request = cache(
+            histogram(
+                "shipshape_request_seconds",
+                "Time of one request at the door, whatever the outcome.",
+                ["door", "method", "outcome"],
+                buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
+            ).labels
+        )
+        self._wait = cache(
+            histogram(
+                "shipshape_queue_seconds",
+                "Time that a contact waited for a worker.",
+                ["lane"],
+                buckets=STAGE_BUCKETS,
+            ).labels
         )
         self._age = histogram(
             "shipshape_age_seconds",
             "Age of the points when their request came, where the caller tells it.",
             buckets=AGE_BUCKETS,
         )
-        self._contacts = counter("shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"])
-        self._client_refusals = counter(
-            "shipshape_client_refusals", "Requests refused for who asks: token, rate or under_way.", ["reason"]
+        self._contacts = cache(
+            counter("shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"]).labels
         )
-        self._in_flight = gauge("shipshape_in_flight", "Requests under way.", ["door"])
+        self._client_refusals = cache(
+            counter(
+                "shipshape_client_refusals", "Requests refused for who asks: token, rate or under_way.", ["reason"]
+            ).labels
+        )
+        self._in_flight = cache(gauge("shipshape_in_flight", "Requests under way.", ["door"]).labels)
         self._ready = gauge("shipshape_ready", "1 while the service takes requests.")
-        self._held = counter(
-            "shipshape_budget",
-            "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
-            ["inside"],
+        self._held = cache(
+            counter(
+                "shipshape_budget",
+                "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
+                ["inside"],
+            ).labels
         )
         watch_budget(budget, registry)
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
@@ -96,16 +112,16 @@ class Metrics:
 
     def observe_stage(self, stage: str, seconds: float) -> None:
         """One stage ran; seconds."""
-        self._stage.labels(stage).observe(seconds)
+        self._stage(stage).observe(seconds)
 
     def count_contacts(self, door: str, outcomes: Iterable[str]) -> None:
         """Contacts of a scan were answered ("ok") or refused (the kind of the error)."""
         for outcome, count in collections.Counter(outcomes).items():
-            self._contacts.labels(door, outcome).inc(count)
+            self._contacts(door, outcome).inc(count)
 
     def observe_wait(self, lane: str, seconds: float) -> None:
         """A contact of this lane waited; seconds."""
-        self._wait.labels(lane).observe(seconds)
+        self._wait(lane).observe(seconds)
 
     def observe_age(self, seconds: float) -> None:
         """The points of a request were this old; seconds."""
@@ -113,7 +129,7 @@ class Metrics:
 
     def count_client_refusal(self, reason: str) -> None:
         """A request was refused for who asks; who that is would be a label without bounds."""
-        self._client_refusals.labels(reason).inc()
+        self._client_refusals(reason).inc()
 
     def set_ready(self, ready: bool) -> None:
         """Whether the service takes requests."""
@@ -124,15 +140,17 @@ class Metrics:
         self._bundle.info({"name": name, "digest": digest})
 
     @contextmanager
-    def request(self, door: str, method: str) -> Iterator[Outcome]:
+    def request(self, door: str, method: str, waited: float = 0.0) -> Iterator[Outcome]:
         """Time one request; its outcome is what the block leaves in the yielded object.
+
+        `waited` is how long ago its first byte came, seconds.
 
         Contacts of an answered scan are counted one by one, by `count_contacts`; those of a scan that was refused
         as a whole are counted here, each with the kind of the refusal.
         """
         outcome = Outcome(contacts=int(method == SINGLE))
-        start = time.perf_counter()
-        in_flight = self._in_flight.labels(door)
+        start = time.perf_counter() - waited
+        in_flight = self._in_flight(door)
         in_flight.inc()
         try:
             yield outcome
@@ -143,12 +161,12 @@ class Metrics:
         finally:
             seconds = time.perf_counter() - start
             in_flight.dec()
-            self._request.labels(door, method, outcome.kind).observe(seconds)
+            self._request(door, method, outcome.kind).observe(seconds)
             if outcome.contacts and (method == SINGLE or outcome.kind not in (OK, DEGRADED)):
-                self._contacts.labels(door, outcome.kind).inc(outcome.contacts)
+                self._contacts(door, outcome.kind).inc(outcome.contacts)
             if method in RECOGNISING and outcome.urgent and outcome.kind in HELD:
                 inside = self.budget.tell(seconds, answered=outcome.kind in (OK, DEGRADED))
-                self._held.labels(str(inside).lower()).inc()
+                self._held(str(inside).lower()).inc()
             _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
 
 

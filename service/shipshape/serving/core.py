@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 from shipshape.bundle import Bundle
-from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
+from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady, Overloaded
 from shipshape.executor import Ended, Executor, Lane, Stage, Task, Ticket
+from shipshape.executor.lanes import places
 from shipshape.serving.age import age_of, time_left
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
@@ -214,6 +215,31 @@ class Core:
     def load(self) -> float:
         """Contacts that wait or are computed, a worker: over 1, there is a queue."""
         return (self._executor.queue_depth + self._executor.running) / self._executor.workers
+
+    def sheds(self, lane: Lane, deadline: float) -> None:
+        """Raises at once what admission would say to even the cheapest contact of this lane.
+
+        Args:
+            lane: Of the request; the most urgent one when it is not known.
+            deadline: From `deadline_in`.
+
+        Raises:
+            Overloaded, DeadlineExceeded: No place in the queue, or no time behind all that waits.
+        """
+        left = deadline - self._executor.clock()
+        if left <= 0:
+            raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
+        depth, limit = self._executor.queue_depth, self._executor.queue_limit
+        if depth >= places(lane, limit):
+            retry_after_s = self._executor.wait(lane) / depth
+            raise Overloaded(
+                f"expected at most 0 more in the queue of {limit}, got 1", retry_after_s=retry_after_s
+            )
+        if depth and (wait := self._executor.wait(lane)) > left:
+            raise Overloaded(
+                f"expected {wait * 1e3:.0f} ms for an answer behind all that waits, got {left * 1e3:.0f} ms",
+                retry_after_s=wait - left,
+            )
 
     def submit(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Ticket[Answer]:
         """Queue one contact; a ticket for its answer.

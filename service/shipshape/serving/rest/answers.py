@@ -25,6 +25,16 @@ def to_bytes(value: Json) -> bytes:
     return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
+def encode_answer(answer: Answer, wishes: Wishes) -> bytes:
+    """The body of an answer about one contact."""
+    return to_bytes(from_answer(answer, wishes))
+
+
+def encode_scan(contact_ids: Sequence[str], outcomes: Sequence[Answer | Fault], wishes: Wishes) -> bytes:
+    """The body of an answer about a scan, in the order of its contacts."""
+    return to_bytes(from_outcomes(contact_ids, outcomes, wishes))
+
+
 def from_answer(answer: Answer, wishes: Wishes) -> Json:
     """A `RecognitionAnswer`, with what the caller wished to see."""
     found = answer.recognition
