@@ -4,15 +4,15 @@ import asyncio
 import collections
 import json
 import logging
-import secrets
+import random
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector
 
@@ -30,6 +30,7 @@ STREAM = "recognise_stream"  # each of its messages counts as a request of many 
 INFER = "infer"  # that of the Open Inference Protocol, whose request may be either
 RECOGNISING = (SINGLE, SCAN, STREAM, INFER)
 
+M = TypeVar("M", Counter, Gauge, Histogram)
 request_id: ContextVar[str] = ContextVar("request_id", default="")
 _logger = logging.getLogger(__name__)
 
@@ -37,7 +38,8 @@ _logger = logging.getLogger(__name__)
 def new_request_id(proposed: str = "") -> str:
     """The caller's own id if it is harmless in a log, else a fresh one; set for the current context."""
     harmless = 0 < len(proposed) <= 64 and all(char.isalnum() or char in "-_.:" for char in proposed)
-    chosen = proposed if harmless and proposed.isascii() else secrets.token_hex(8)
+    # Not the system's random bytes: asking for them hands the interpreter's lock to others, for no gain here.
+    chosen = proposed if harmless and proposed.isascii() else f"{random.getrandbits(64):016x}"
     request_id.set(chosen)
     return chosen
 
@@ -62,49 +64,33 @@ class Metrics:
     def __init__(self, registry: CollectorRegistry, budget: Budget) -> None:
         self.registry = registry
         self.budget = budget
-        histogram, counter = partial(Histogram, registry=registry), partial(Counter, registry=registry)
-        gauge = partial(Gauge, registry=registry)
-        # Of a metric with labels, its child by their values: kept, for finding one takes a lock and a detour.
-        self._stage = cache(
-            histogram("shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS).labels
+        histogram, counter = partial(_children, Histogram, registry), partial(_children, Counter, registry)
+        self._stage = histogram("shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS)
+        self._request = histogram(
+            "shipshape_request_seconds",
+            "Time of one request at the door, whatever the outcome.",
+            ["door", "method", "outcome"],
+            buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
         )
-        self._request = cache(
-            histogram(
-                "shipshape_request_seconds",
-                "Time of one request at the door, whatever the outcome.",
-                ["door", "method", "outcome"],
-                buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
-            ).labels
+        self._wait = histogram(
+            "shipshape_queue_seconds", "Time that a contact waited for a worker.", ["lane"], buckets=STAGE_BUCKETS
         )
-        self._wait = cache(
-            histogram(
-                "shipshape_queue_seconds",
-                "Time that a contact waited for a worker.",
-                ["lane"],
-                buckets=STAGE_BUCKETS,
-            ).labels
-        )
-        self._age = histogram(
+        self._age = Histogram(
             "shipshape_age_seconds",
             "Age of the points when their request came, where the caller tells it.",
             buckets=AGE_BUCKETS,
+            registry=registry,
         )
-        self._contacts = cache(
-            counter("shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"]).labels
+        self._contacts = counter("shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"])
+        self._client_refusals = counter(
+            "shipshape_client_refusals", "Requests refused for who asks: token, rate or under_way.", ["reason"]
         )
-        self._client_refusals = cache(
-            counter(
-                "shipshape_client_refusals", "Requests refused for who asks: token, rate or under_way.", ["reason"]
-            ).labels
-        )
-        self._in_flight = cache(gauge("shipshape_in_flight", "Requests under way.", ["door"]).labels)
-        self._ready = gauge("shipshape_ready", "1 while the service takes requests.")
-        self._held = cache(
-            counter(
-                "shipshape_budget",
-                "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
-                ["inside"],
-            ).labels
+        self._in_flight = _children(Gauge, registry, "shipshape_in_flight", "Requests under way.", ["door"])
+        self._ready = Gauge("shipshape_ready", "1 while the service takes requests.", registry=registry)
+        self._held = counter(
+            "shipshape_budget",
+            "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
+            ["inside"],
         )
         watch_budget(budget, registry)
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
@@ -168,6 +154,13 @@ class Metrics:
                 inside = self.budget.tell(seconds, answered=outcome.kind in (OK, DEGRADED))
                 self._held(str(inside).lower()).inc()
             _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
+
+
+def _children(
+    kind: type[M], registry: CollectorRegistry, name: str, text: str, labels: Sequence[str], **more: Any
+) -> Callable[..., M]:
+    """A metric's child by the values of its labels; kept, for the metric itself takes a lock to find it."""
+    return cache(kind(name, text, labels, registry=registry, **more).labels)
 
 
 class Workers(Protocol):

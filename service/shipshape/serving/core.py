@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 from shipshape.bundle import Bundle
-from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady, Overloaded
+from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
 from shipshape.executor import Ended, Executor, Lane, Stage, Task, Ticket
-from shipshape.executor.lanes import places
 from shipshape.serving.age import age_of, time_left
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
+from shipshape.serving.shedding import check_room
 from shipshape.serving.timing import summed
 from shipshape.telemetry import DEGRADED, OK, Metrics
 from shipshape.types import Contact, Options, Recognition, Rung
@@ -164,11 +164,7 @@ class Core:
         self._model = model
 
     def rehearse(self, model: Model, contact: Contact) -> None:
-        """Run a contact on every rung, so that their costs are known before the first request.
-
-        Raises:
-            Exception: Whatever a stage raises.
-        """
+        """Run a contact on every rung, for their costs to be known before the first request; raises as they do."""
         for rung in (*Rung, *Rung):
             wishes = Wishes(Options(lowest_rung=rung))
             task = self._task(model, contact, wishes, math.inf)
@@ -198,11 +194,7 @@ class Core:
         return model
 
     def capacity(self, points: int, lane: Lane) -> Capacity:
-        """What would be promised now to a contact of so many points in this lane.
-
-        Raises:
-            NotReady: The service is starting or stopping.
-        """
+        """What would be promised now to a contact of so many points in this lane; raises as `model` does."""
         ladder = self.model().pipeline.ladder(Options())
         return Capacity(
             {rung.name: self._executor.promise(rung, points, lane) for rung in ladder},
@@ -217,29 +209,8 @@ class Core:
         return (self._executor.queue_depth + self._executor.running) / self._executor.workers
 
     def sheds(self, lane: Lane, deadline: float) -> None:
-        """Raises at once what admission would say to even the cheapest contact of this lane.
-
-        Args:
-            lane: Of the request; the most urgent one when it is not known.
-            deadline: From `deadline_in`.
-
-        Raises:
-            Overloaded, DeadlineExceeded: No place in the queue, or no time behind all that waits.
-        """
-        left = deadline - self._executor.clock()
-        if left <= 0:
-            raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
-        depth, limit = self._executor.queue_depth, self._executor.queue_limit
-        if depth >= places(lane, limit):
-            retry_after_s = self._executor.wait(lane) / depth
-            raise Overloaded(
-                f"expected at most 0 more in the queue of {limit}, got 1", retry_after_s=retry_after_s
-            )
-        if depth and (wait := self._executor.wait(lane)) > left:
-            raise Overloaded(
-                f"expected {wait * 1e3:.0f} ms for an answer behind all that waits, got {left * 1e3:.0f} ms",
-                retry_after_s=wait - left,
-            )
+        """Raises at once what admission would say to even the cheapest contact of this lane; see `shedding`."""
+        check_room(self._executor, lane, deadline)
 
     def submit(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Ticket[Answer]:
         """Queue one contact; a ticket for its answer.

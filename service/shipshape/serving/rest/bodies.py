@@ -47,6 +47,9 @@ class Bodies:
             self._held -= sum(map(len, chunks))
 
     async def _in_time(self, chunks: list[bytes], incoming: Incoming, seconds: float) -> None:
+        if incoming.whole:  # as usual: no timer is needed
+            await self._fill(chunks, incoming)
+            return
         try:
             async with asyncio.timeout(seconds):
                 await self._fill(chunks, incoming)

@@ -22,9 +22,10 @@ class Incoming:
         client: The name that limits hold for.
         connection: Tells when the client leaves.
         mailbox: Tells when tickets are settled.
+        whole: Whether all of its body was there when its handler began.
     """
 
-    __slots__ = ("_headers", "_received", "client", "connection", "mailbox", "query", "receive", "scope")
+    __slots__ = ("_headers", "_received", "client", "connection", "mailbox", "query", "receive", "scope", "whole")
 
     def __init__(self, scope: Scope, receive: Receive) -> None:
         state = scope["state"]
@@ -34,6 +35,7 @@ class Incoming:
         self.client: str = state["client"]
         self.connection: Connection = state["connection"]
         self.mailbox: Mailbox = state["mailbox"]
+        self.whole: bool = state.get("whole", False)
         self._received: float = state["received"]
         self._headers = dict(reversed(scope["headers"]))  # the first of each name
 

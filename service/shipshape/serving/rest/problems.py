@@ -42,9 +42,9 @@ def problem(fault: Fault) -> Response:
     """The problem document of a fault."""
     title = fault.kind.replace("_", " ").capitalize()
     response = document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
-    response.headers.update(retry_headers(fault))
+    response.raw_headers += [(name.lower().encode(), text.encode()) for name, text in retry_headers(fault).items()]
     if fault.kind is FaultKind.UNAUTHENTICATED:
-        response.headers["WWW-Authenticate"] = "Bearer"
+        response.raw_headers.append((b"www-authenticate", b"Bearer"))
     return response
 
 

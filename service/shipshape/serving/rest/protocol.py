@@ -18,11 +18,13 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 from shipshape.serving.clients import client_name
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.rest.connection import Connection
+from shipshape.serving.rest.joined import Joined
 from shipshape.serving.rest.problems import document
 from shipshape.telemetry import new_request_id
 
 HEADER_BYTES = 64 * 2**10  # of one request; and at most so many come without anything of it being complete
 HEAD_S = 20.0  # in which the headers of a request must come, once they began to
+LINGER_S = 1.0  # in which a client that is still sending gets to read why it was refused
 MOST_PIPELINED = 1024  # requests on one connection that wait for the one before them
 MOST_CONNECTIONS = 4096
 VERSIONS = ("1.0", "1.1")
@@ -32,7 +34,7 @@ _logger = logging.getLogger(__name__)
 
 
 class Protocol(HttpToolsProtocol):
-    """Each request's state has its `connection`, and `received`: when its first byte came, monotonic seconds."""
+    """Each request's state gets its `connection`, and what `Incoming` says of `received` and `whole`."""
 
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]  # as its parent does
         """A connection, its handshake done."""
@@ -42,6 +44,7 @@ class Protocol(HttpToolsProtocol):
         tls: ssl.SSLObject | None = transport.get_extra_info("ssl_object")
         certificate = _name(tls.getpeercert() or {}) if tls is not None else None
         self._connection = Connection(client_name(None, certificate, self.client[0] if self.client else ""))
+        self._joined: Any = Joined(transport)
         self.app_state = {**self.app_state, "connection": self._connection}
         if len(self.connections) > MOST_CONNECTIONS:
             sentence = f"expected at most {MOST_CONNECTIONS} connections, got one more"
@@ -86,6 +89,7 @@ class Protocol(HttpToolsProtocol):
             return  # the parser stops here, and `_feed` goes on
         self._check_head()
         super().on_headers_complete()
+        self.cycle.transport = self._joined
         self.headers = []  # for the trailers; the request keeps the list that it has
 
     def on_body(self, body: bytes) -> None:
@@ -96,7 +100,13 @@ class Protocol(HttpToolsProtocol):
     def on_message_complete(self) -> None:
         """The end of a request."""
         if not self.parser.should_upgrade():
+            self.scope["state"]["whole"] = True
             super().on_message_complete()
+
+    def on_response_complete(self) -> None:
+        """The end of an answer."""
+        self._joined.flush()
+        super().on_response_complete()
 
     def _check_head(self) -> None:
         version, method = self.parser.get_http_version(), self.parser.get_method()
@@ -105,7 +115,7 @@ class Protocol(HttpToolsProtocol):
         hosts = sum(name == b"host" for name, _ in self.headers)
         if hosts > 1 or (hosts == 0 and version == "1.1"):
             raise _RefusedError(400, _INVALID, f"expected the header Host once, got it {hosts} times")
-        if len(self.url) + sum(len(name) + len(value) for name, value in self.headers) > HEADER_BYTES:
+        if len(self.url) + sum(len(name) + len(value) + 4 for name, value in self.headers) > HEADER_BYTES:
             raise _too_large()
         if len(self.pipeline) >= MOST_PIPELINED:
             raise _RefusedError(429, _OVERLOADED, f"expected at most {MOST_PIPELINED} requests at once, got more")
@@ -142,7 +152,11 @@ class Protocol(HttpToolsProtocol):
             return
         if not (self._owed() and self.cycle.response_started):
             self.transport.write(self._written(refused))
-        self.transport.close()
+        if self.transport.can_write_eof():
+            self.transport.write_eof()
+            self._close_in(LINGER_S)  # a socket that is closed with bytes unread takes back what it has sent
+        else:
+            self.transport.close()
 
     def _written(self, refused: "_RefusedError") -> bytes:
         new_request_id()
