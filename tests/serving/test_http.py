@@ -105,6 +105,35 @@ def test_what_came_whole_before_is_still_answered(doors):
     assert statuses(doors, GOOD + LIVE + MALFORMED["no host"]) == [200, 200]
 
 
+def test_what_is_refused_before_its_body_came_does_not_spoil_the_connection(doors):
+    with connected(doors) as (client, answers):
+        client.sendall(HALF.replace(b"octet-stream", b"csv"))
+        assert read(answers)[0] == 415
+        client.sendall(bytes(4800 - 3) + LIVE)
+        assert read(answers)[0] == 200
+
+
+def test_one_request_never_gets_two_answers(doors):
+    wrong = post("Transfer-Encoding: chunked").replace(b"octet-stream", b"csv")
+    with connected(doors) as (client, answers):
+        client.sendall(wrong)
+        assert read(answers)[0] == 415
+        client.sendall(b"zz\r\n" + LIVE)
+        assert read(answers) is None
+
+
+def test_a_body_that_goes_wrong_half_way_leaves_nothing_behind(caplog):
+    with running() as doors:
+        with connected(doors) as (client, answers):
+            client.sendall(post("Transfer-Encoding: chunked", body=b"3\r\nabc\r\n"))
+            until(lambda: in_flight(doors) == 1)
+            client.sendall(b"zz\r\n")
+            assert read(answers)[0] == 400
+            until(lambda: in_flight(doors) == 0)
+        assert 'method="recognise",outcome="cancelled"} 1.0' in doors.rest.get("/metrics").text
+    assert not [record for record in caplog.records if record.levelname in ("ERROR", "CRITICAL")]
+
+
 def test_http_1_0_needs_no_host_and_is_closed_when_answered(doors):
     assert statuses(doors, b"GET /livez HTTP/1.0\r\n\r\n") == [200]
 

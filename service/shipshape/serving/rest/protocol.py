@@ -39,7 +39,7 @@ class Protocol(HttpToolsProtocol):
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]  # as its parent does
         """A connection, its handshake done."""
         super().connection_made(transport)
-        self._heading = False  # whether the headers of a request are on their way
+        self._heading = self._in_body = False  # which part of a request is on its way
         self._silent = 0  # bytes since anything of a request was complete
         tls: ssl.SSLObject | None = transport.get_extra_info("ssl_object")
         certificate = _name(tls.getpeercert() or {}) if tls is not None else None
@@ -79,7 +79,7 @@ class Protocol(HttpToolsProtocol):
     def on_message_begin(self) -> None:
         """The first byte of a request."""
         super().on_message_begin()
-        self._heading, self._silent = True, 0
+        self._heading, self._in_body, self._silent = True, False, 0
         self.scope["state"]["received"] = time.monotonic()
 
     def on_headers_complete(self) -> None:
@@ -89,6 +89,7 @@ class Protocol(HttpToolsProtocol):
             return  # the parser stops here, and `_feed` goes on
         self._check_head()
         super().on_headers_complete()
+        self._in_body = True
         self.cycle.transport = self._joined
         self.headers = []  # for the trailers; the request keeps the list that it has
 
@@ -100,6 +101,7 @@ class Protocol(HttpToolsProtocol):
     def on_message_complete(self) -> None:
         """The end of a request."""
         if not self.parser.should_upgrade():
+            self._in_body = False
             self.scope["state"]["whole"] = True
             super().on_message_complete()
 
@@ -147,11 +149,14 @@ class Protocol(HttpToolsProtocol):
         """Read no more of this connection, and close it; before that, answer what can still be answered."""
         _logger.debug("refused %s: %s", self._connection.client, refused.sentence)
         self.parser = None  # type: ignore[assignment]  # as its parent does
-        if self._owed() and (self.pipeline or not self.cycle.more_body):
+        if self._owed() and (self.pipeline or not self._in_body):
             self.cycle.keep_alive = False  # whole requests came before: theirs are the next answers
             return
-        if not (self._owed() and self.cycle.response_started):
+        if not (self._in_body and self.cycle.response_started):
             self.transport.write(self._written(refused))
+        if self._owed():  # who still waits for the body
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
         if self.transport.can_write_eof():
             self.transport.write_eof()
             self._close_in(LINGER_S)  # a socket that is closed with bytes unread takes back what it has sent
