@@ -2,59 +2,18 @@
 
 import json
 import re
-import select
 import socket
 import time
-from contextlib import contextmanager
 
 import pytest
 
-from serving.fakes import HALF, HEAD, PATIENCE, cluster, running, until
+from serving.fakes import HALF, HEAD, cluster, running, until
+from serving.http_calls import LIVE, connected, in_flight, post, read, statuses
 from shipshape.serving.rest import protocol
 
 POINTS = cluster()
 PACKED = POINTS.tobytes()
 GOOD = HEAD.format(len(PACKED)).encode() + b"\r\n" + PACKED
-LIVE = b"GET /livez HTTP/1.1\r\nHost: x\r\n\r\n"
-
-
-@contextmanager
-def connected(doors):
-    """A socket to the REST door, and a file to read its answers from."""
-    address = "127.0.0.1", doors.addresses.rest_port
-    with socket.create_connection(address, timeout=PATIENCE) as client, client.makefile("rb") as answers:
-        yield client, answers
-
-
-def read(answers):
-    """Status, headers and body of the next answer; None when the connection was closed."""
-    line = answers.readline()
-    if not line:
-        return None
-    headers = {}
-    while (header := answers.readline()) not in (b"\r\n", b""):
-        name, _, value = header.decode().partition(": ")
-        headers[name.lower()] = value.strip()
-    return int(line.split()[1]), headers, answers.read(int(headers["content-length"]))
-
-
-def statuses(doors, content):
-    """The statuses of all answers to `content`, until the connection is closed; it must be."""
-    with connected(doors) as (client, answers):
-        client.sendall(content)
-        found = []
-        while (answer := read(answers)) is not None:
-            found.append(answer[0])
-        return found
-
-
-def post(*headers, body=b"", path="/v1/recognise"):
-    lines = ("Host: x", "Content-Type: application/octet-stream", *headers)
-    return (
-        f"POST {path} HTTP/1.1\r\n".encode() + "".join(f"{line}\r\n" for line in lines).encode() + b"\r\n" + body
-    )
-
-
 SMUGGLED = b"0\r\n\r\n" + LIVE
 MALFORMED = {
     "two lengths": post("Content-Length: 3", "Content-Length: 30", body=b"abc" + LIVE),
@@ -213,69 +172,6 @@ def test_expect_100_continue_is_told_to_go_on_but_not_who_is_refused_anyway(door
         assert read(answers)[0] == 413
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"GET /livez HTTP/1.1\r\nHost: x\r\nX: " + b"x" * 70_000 + b"\r\n\r\n",
-        b"GET /livez HTTP/1.1\r\nHost: x\r\n" + b"X: y\r\n" * 20_000 + b"\r\n",
-        b"GET /" + b"x" * 70_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
-    ],
-    ids=["one header", "many headers", "path"],
-)
-def test_headers_over_the_limit_are_431(doors, content):
-    with connected(doors) as (client, answers):
-        client.sendall(content)
-        status, headers, body = read(answers)
-        assert (status, json.loads(body)["error"]) == (431, "too_large")
-        assert headers["connection"] == "close"
-
-
-@pytest.mark.parametrize(
-    "begin",
-    [
-        b"GET /livez HTTP/1.1\r\nHost: x\r\nX: ",
-        post("Transfer-Encoding: chunked", body=b"0\r\nX: "),
-        post("Transfer-Encoding: chunked", body=b"1;x="),
-    ],
-    ids=["header", "trailer", "chunk extension"],
-)
-def test_what_never_ends_is_not_kept(doors, begin):
-    with connected(doors) as (client, answers):
-        client.sendall(begin)
-        for _ in range(2**26 // 2**16):  # far more than the buffers between us hold
-            client.sendall(b"x" * 2**16)
-            if select.select([client], [], [], 0)[0]:
-                break
-        assert read(answers)[0] == 431
-
-
-def test_headers_that_do_not_come_and_connections_that_say_nothing_are_closed(monkeypatch):
-    monkeypatch.setattr(protocol, "HEAD_S", 0.05)
-    monkeypatch.setattr("shipshape.serving.rest.server.KEEP_ALIVE_S", 0.05)
-    with running() as doors:
-        for begun in (b"", LIVE[:30]):
-            with connected(doors) as (client, answers):
-                client.sendall(begun)
-                assert answers.read() == b""
-        with connected(doors) as (client, answers):
-            client.sendall(HALF)  # its body has until the deadline of the request
-            until(lambda: in_flight(doors) == 1)
-
-
-def test_too_many_connections_are_told_so(monkeypatch):
-    monkeypatch.setattr(protocol, "MOST_CONNECTIONS", 3)
-    with running() as doors:
-        doors.rest.get("/livez")
-        with connected(doors) as (first, answers), connected(doors) as (second, others):
-            for client, file in ((first, answers), (second, others)):
-                client.sendall(LIVE)
-                assert read(file)[0] == 200
-            with connected(doors) as (_, refused):
-                status, _, body = read(refused)
-                assert (status, json.loads(body)["error"]) == (429, "overloaded")
-        until(lambda: statuses(doors, LIVE.replace(b"Host", b"Connection: close\r\nHost")) == [200])
-
-
 def test_an_answer_leaves_in_one_piece(doors):
     with connected(doors) as (client, _):
         client.sendall(GOOD)
@@ -302,8 +198,3 @@ def test_the_deadline_counts_from_the_first_byte():
         status, _, body = read(answers)
         assert (status, json.loads(body)["error"]) == (504, "deadline_exceeded")
         assert json.loads(body)["detail"].endswith("got a request that is already late")
-
-
-def in_flight(doors):
-    text = doors.rest.get("/metrics").text
-    return float(text.partition('shipshape_in_flight{door="rest"} ')[2].split()[0])

@@ -12,6 +12,21 @@ from shipshape.serving.shedding import check_room
 
 POINTS = cluster()
 PACKED = {"content-type": "application/octet-stream"}
+ASK = {"content": POINTS.tobytes(), "headers": PACKED}
+
+
+def ask_behind_a_held_worker(doors, count):
+    """Threads that ask: one whose contact keeps the worker, and `count` whose contacts wait behind it."""
+    threads = [
+        threading.Thread(target=doors.rest.post, args=(f"/v1/recognise?contact_id={name}",), kwargs=ASK)
+        for name in ("hold", *range(count))
+    ]
+    threads[0].start()
+    assert doors.pipeline.entered.acquire(timeout=PATIENCE)
+    for thread in threads[1:]:
+        thread.start()
+    until(lambda: doors.service.executor.queue_depth == count)
+    return threads
 
 
 class Held:
@@ -77,16 +92,7 @@ def test_who_has_no_time_behind_what_waits_is_told_how_long_that_is(held, monkey
 
 def test_a_full_queue_refuses_before_the_body_is_there_and_counts_the_contacts():
     with running(queue_limit=2, max_contacts=2) as doors:
-        hold = "/v1/recognise?contact_id=hold"
-        threads = [
-            threading.Thread(
-                target=doors.rest.post, args=(hold,), kwargs={"content": POINTS.tobytes(), "headers": PACKED}
-            )
-            for _ in range(3)
-        ]
-        for thread in threads:
-            thread.start()
-        until(lambda: doors.service.executor.queue_depth == 2)
+        threads = ask_behind_a_held_worker(doors, 2)
         with socket.create_connection(("127.0.0.1", doors.addresses.rest_port), timeout=PATIENCE) as client:
             client.sendall(HEAD.format(4800).encode() + b"\r\nabc")
             assert client.recv(100).startswith(b"HTTP/1.1 429 ")
@@ -103,17 +109,8 @@ def test_a_full_queue_refuses_before_the_body_is_there_and_counts_the_contacts()
 def test_a_lane_that_only_the_body_tells_is_not_refused_for_another():
     """The place that is kept for collision is theirs, in JSON too."""
     with running(queue_limit=8, max_contacts=8) as doors:
-        ask = {"content": POINTS.tobytes(), "headers": PACKED}
-        threads = [threading.Thread(target=doors.rest.post, args=("/v1/recognise?contact_id=hold",), kwargs=ask)]
-        threads[0].start()
-        assert doors.pipeline.entered.acquire(timeout=PATIENCE)
-        threads += [
-            threading.Thread(target=doors.rest.post, args=("/v1/recognise",), kwargs=ask) for _ in range(7)
-        ]
-        for thread in threads[1:]:
-            thread.start()
-        until(lambda: doors.service.executor.queue_depth == 7)
-        assert doors.rest.post("/v1/recognise", **ask).status_code == 429
+        threads = ask_behind_a_held_worker(doors, 7)
+        assert doors.rest.post("/v1/recognise", **ASK).status_code == 429
         assert doors.ask_rest(POINTS).status_code == 429
         urgent = threading.Thread(
             target=lambda: doors.kept.append(doors.ask_rest(POINTS, lane="collision").status_code)
