@@ -47,8 +47,8 @@ class Settings(BaseSettings):
         0,
         ge=0,
         le=1024,
-        description="Processes or threads that compute; 0 is one a usable core. More of them share the same cores: "
-        "higher latency, no more throughput.",
+        description="What computes, processes or threads; 0: one a usable core. More of them share the same cores, "
+        "for higher latency and no more throughput.",
     )
     compute: Compute = Field(
         Compute.PROCESSES,

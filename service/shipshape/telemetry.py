@@ -7,12 +7,12 @@ import logging
 import random
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import partial
-from typing import Protocol
+from functools import cache, partial
+from typing import Any, Protocol, TypeVar
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector
 
@@ -31,6 +31,7 @@ STREAM = "recognise_stream"  # each of its messages counts as a request of many 
 INFER = "infer"  # that of the Open Inference Protocol, whose request may be either
 RECOGNISING = (SINGLE, SCAN, STREAM, INFER)
 
+M = TypeVar("M", Counter, Gauge, Histogram)
 request_id: ContextVar[str] = ContextVar("request_id", default="")
 _logger = logging.getLogger(__name__)
 
@@ -38,6 +39,7 @@ _logger = logging.getLogger(__name__)
 def new_request_id(proposed: str = "") -> str:
     """The caller's own id if it is harmless in a log, else a fresh one; set for the current context."""
     harmless = 0 < len(proposed) <= 64 and all(char.isalnum() or char in "-_.:" for char in proposed)
+    # Not the system's random bytes: asking for them hands the interpreter's lock to others, for no gain here.
     chosen = proposed if harmless and proposed.isascii() else f"{random.getrandbits(64):016x}"
     request_id.set(chosen)
     return chosen
@@ -67,8 +69,7 @@ class Metrics:
     def __init__(self, registry: CollectorRegistry, budget: Budget) -> None:
         self.registry = registry
         self.budget = budget
-        histogram, counter = partial(Histogram, registry=registry), partial(Counter, registry=registry)
-        gauge = partial(Gauge, registry=registry)
+        histogram, counter = partial(_children, Histogram, registry), partial(_children, Counter, registry)
         bulk = partial(BulkHistogram, buckets=STAGE_BUCKETS, registry=registry)
         self.observe_stage = bulk("shipshape_stage_seconds", "Time of one stage.", "stage").observe
         self.observe_wait = bulk(
@@ -80,17 +81,18 @@ class Metrics:
             ["door", "method", "outcome"],
             buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
         )
-        self._age = histogram(
+        self._age = Histogram(
             "shipshape_age_seconds",
             "Age of the points when their request came, where the caller tells it.",
             buckets=AGE_BUCKETS,
+            registry=registry,
         )
         self._contacts = counter("shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"])
         self._client_refusals = counter(
             "shipshape_client_refusals", "Requests refused for who asks: token, rate or under_way.", ["reason"]
         )
-        self._in_flight = gauge("shipshape_in_flight", "Requests under way.", ["door"])
-        self._ready = gauge("shipshape_ready", "1 while the service takes requests.")
+        self._in_flight = _children(Gauge, registry, "shipshape_in_flight", "Requests under way.", ["door"])
+        self._ready = Gauge("shipshape_ready", "1 while the service takes requests.", registry=registry)
         self._held = counter(
             "shipshape_budget",
             "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
@@ -103,7 +105,7 @@ class Metrics:
     def count_contacts(self, door: str, outcomes: Iterable[str]) -> None:
         """Contacts of a scan were answered ("ok") or refused (the kind of the error)."""
         for outcome, count in collections.Counter(outcomes).items():
-            self._contacts.labels(door, outcome).inc(count)
+            self._contacts(door, outcome).inc(count)
 
     def observe_age(self, seconds: float) -> None:
         """The points of a request were this old; seconds."""
@@ -111,7 +113,7 @@ class Metrics:
 
     def count_client_refusal(self, reason: str) -> None:
         """A request was refused for who asks; who that is would be a label without bounds."""
-        self._client_refusals.labels(reason).inc()
+        self._client_refusals(reason).inc()
 
     def set_ready(self, ready: bool) -> None:
         """Whether the service takes requests."""
@@ -122,15 +124,17 @@ class Metrics:
         self._bundle.info({"name": name, "digest": digest})
 
     @contextmanager
-    def request(self, door: str, method: str) -> Iterator[Outcome]:
+    def request(self, door: str, method: str, waited: float = 0.0) -> Iterator[Outcome]:
         """Time one request; its outcome is what the block leaves in the yielded object.
+
+        `waited` is how long ago its first byte came, seconds.
 
         Contacts of an answered scan are counted one by one, by `count_contacts`; those of a scan that was refused
         as a whole are counted here, each with the kind of the refusal.
         """
         outcome = Outcome(contacts=int(method == SINGLE))
-        start = time.perf_counter()
-        in_flight = self._in_flight.labels(door)
+        start = time.perf_counter() - waited
+        in_flight = self._in_flight(door)
         in_flight.inc()
         try:
             yield outcome
@@ -141,13 +145,20 @@ class Metrics:
         finally:
             seconds = time.perf_counter() - start
             in_flight.dec()
-            self._request.labels(door, method, outcome.kind).observe(seconds)
+            self._request(door, method, outcome.kind).observe(seconds)
             if outcome.contacts and (method == SINGLE or outcome.kind not in (OK, DEGRADED)):
-                self._contacts.labels(door, outcome.kind).inc(outcome.contacts)
+                self._contacts(door, outcome.kind).inc(outcome.contacts)
             if method in RECOGNISING and outcome.urgent and outcome.kind in HELD:
                 inside = self.budget.tell(seconds, answered=outcome.kind in (OK, DEGRADED))
-                self._held.labels(str(inside).lower()).inc()
+                self._held(str(inside).lower()).inc()
             _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
+
+
+def _children(
+    kind: type[M], registry: CollectorRegistry, name: str, text: str, labels: Sequence[str], **more: Any
+) -> Callable[..., M]:
+    """A metric's child by the values of its labels; kept, for the metric itself takes a lock to find it."""
+    return cache(kind(name, text, labels, registry=registry, **more).labels)
 
 
 class Workers(Protocol):

@@ -14,6 +14,7 @@ from shipshape.serving.age import age_of, time_left
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
 from shipshape.serving.model import Encode, Model, Order, Reply
+from shipshape.serving.shedding import check_room
 from shipshape.serving.timing import summed
 from shipshape.telemetry import DEGRADED, OK, Metrics
 from shipshape.types import Contact, Options, Rung
@@ -129,11 +130,7 @@ class Core:
         return model
 
     def capacity(self, points: int, lane: Lane) -> Capacity:
-        """What would be promised now to a contact of so many points in this lane.
-
-        Raises:
-            NotReady: The service is starting or stopping.
-        """
+        """What would be promised now to a contact of so many points in this lane; raises as `model` does."""
         ladder = self.model().pipeline.ladder(Options())
         return Capacity(
             {rung.name: self._executor.promise(rung, points, lane) for rung in ladder},
@@ -146,6 +143,10 @@ class Core:
     def load(self) -> float:
         """Contacts that wait or are computed, a worker: over 1, there is a queue."""
         return (self._executor.queue_depth + self._executor.running) / self._executor.workers
+
+    def sheds(self, lane: Lane, deadline: float) -> None:
+        """Raises at once what admission would say to even the cheapest contact of this lane; see `shedding`."""
+        check_room(self._executor, lane, deadline)
 
     def submit(self, model: Model, order: Order[C], deadline: float) -> Ticket[Reply[C]]:
         """Queue one contact; a ticket for its answer.
