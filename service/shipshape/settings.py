@@ -39,8 +39,18 @@ class Settings(BaseSettings):
         0,
         ge=0,
         le=1024,
-        description="Threads that compute; 0 is one a usable core. More of them share the same cores: "
-        "higher latency, no more throughput.",
+        description="Threads that compute; 0 is one a usable core, with a GPU as many as fill two of its runs. "
+        "More of them share the same cores: higher latency, no more throughput.",
+    )
+    provider: Literal["auto", "cpu", "cuda"] = Field(
+        "auto",
+        description="Where networks run. auto: on an NVIDIA GPU if shipshape[gpu] is installed and finds one, "
+        "else on the processor; cuda: the service does not start without a GPU. docs/gpu.md shows how.",
+    )
+    micro_batches: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether contacts that meet at a network share its runs. auto: as far as it is measured to "
+        "pay at the start; a processor gains nothing. on is for measuring and tests.",
     )
     queue_limit: int = Field(
         512,
