@@ -69,8 +69,8 @@ class MicroBatches:
         Raises:
             Exception: What the network raises for these inputs; those of other calls change nothing.
         """
-        rows = _rows_of(inputs)
-        if self.largest == 1 or rows == 0:  # the network itself says what is wrong with inputs that have no rows
+        # Inputs without rows go there too: the network itself says what is wrong with them.
+        if self.largest == 1 or not (rows := _rows_of(inputs)):
             return self._run(inputs)
         call = _Call(inputs, rows)
         if not self._begins(call):
