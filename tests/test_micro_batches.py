@@ -145,6 +145,30 @@ def test_calls_that_meet_are_one_run_padded_to_a_bucket(calls: int, padded: int)
     assert (batches.runs, batches.rows) == (2, 1 + calls)
 
 
+def test_the_network_runs_once_at_a_time() -> None:
+    turns, sizes = threading.Semaphore(0), []
+
+    def network(inputs: Arrays) -> list[np.ndarray]:
+        sizes.append(len(inputs["x"]))
+        assert turns.acquire(timeout=LONG_S)
+        return [2 * inputs["x"], inputs["x"].sum(axis=1)]
+
+    turns.release(2)
+    batches = MicroBatches(network, buckets=(1, 2))
+    outcomes = [Outcome(batches, rows(0.0))]  # tries both buckets, and then waits for its own turn
+    until(lambda: len(sizes) == 3)
+    outcomes.append(Outcome(batches, rows(1.0)))
+    until(lambda: len(batches._line) == 1)
+    turns.release()
+    until(lambda: len(sizes) == 4)  # the second call has the network
+    outcomes.append(Outcome(batches, rows(2.0)))
+    until(lambda: len(batches._line) == 1 or len(sizes) == 5)
+    assert len(sizes) == 4
+    turns.release(2)
+    for value, outcome in enumerate(outcomes):
+        right(outcome.result(), rows(float(value)))
+
+
 def test_no_run_is_larger_than_the_largest_bucket_and_those_who_came_first_go_first() -> None:
     network = Network()
     batches = tried(network, buckets=(1, 2, 4))

@@ -73,10 +73,14 @@ class MicroBatches:
         if self.largest == 1 or not (rows := _rows_of(inputs)):
             return self._run(inputs)
         call = _Call(inputs, rows)
-        if not self._begins(call):
-            self._wait(call)
-        if call.leads:
-            self._lead(call)
+        try:
+            if not self._begins(call):
+                call.woken.wait()
+            if call.leads:
+                self._lead(call)
+        finally:  # also when a signal ends the wait: whatever this call holds, others need it
+            if call.outputs is None or call.leads:
+                self._leave(call)
         return self._run(inputs) if call.outputs is None else call.outputs
 
     def _begins(self, call: "_Call") -> bool:
@@ -85,27 +89,28 @@ class MicroBatches:
             if self._busy:
                 self._line.append(call)
             else:
-                self._busy = call.leads = True
+                call.leads = self._busy = True
             return call.leads
 
-    def _wait(self, call: "_Call") -> None:
-        try:
-            call.woken.wait()
-        except BaseException:  # a signal: nobody will take what this call was given, so it goes to the next
-            with self._lock:
-                if call in self._line:
-                    self._line.remove(call)
-                leads = call.leads
-            if leads:
-                self._hand_over()
-            raise
+    def _leave(self, call: "_Call") -> None:
+        """Stand in line no longer, and hand the network, if this call has it, to the first who does."""
+        with self._lock:
+            if call in self._line:
+                self._line.remove(call)
+            if not call.leads:
+                return
+            call.leads, self._busy = False, bool(self._line)
+            if self._line:
+                heir = self._line.popleft()
+                heir.leads = True
+                heir.woken.set()
 
     def _lead(self, first: "_Call") -> None:
         batch = [first]
         try:
             if not self._tried:
                 self._try_buckets(first)
-            batch = self._gather(first)
+            self._gather(batch)
             self._compute(batch)
         except Exception as error:
             if len(batch) == 1:
@@ -115,13 +120,14 @@ class MicroBatches:
                 "%s failed for %d calls at once, which now run alone: %r", self._label, len(batch), error
             )
         finally:  # also when this thread is made to end: the others must not wait for it
-            self._hand_over()
+            self._leave(first)
             for call in batch[1:]:
                 call.woken.set()
 
-    def _gather(self, first: "_Call") -> list["_Call"]:
-        """The first call, and whoever in line is of its shape and has room beside it, in their order."""
-        batch, rows, left = [first], first.rows, []
+    def _gather(self, batch: list["_Call"]) -> None:
+        """Add to the first call whoever in line is of its shape and has room beside it, in their order."""
+        first, left = batch[0], deque[_Call]()
+        rows = first.rows
         with self._lock:
             for call in self._line:
                 if call.shape == first.shape and rows + call.rows <= self.largest:
@@ -129,10 +135,9 @@ class MicroBatches:
                     rows += call.rows
                 else:
                     left.append(call)
-            self._line = deque(left)
+            self._line = left
             self.runs += 1
             self.rows += rows
-        return batch
 
     def _compute(self, batch: Sequence["_Call"]) -> None:
         rows = sum(call.rows for call in batch)
@@ -151,14 +156,6 @@ class MicroBatches:
         """The least bucket that holds so many rows; beyond the largest, a multiple of it."""
         fits = (bucket for bucket in self._buckets if bucket >= rows)
         return next(fits, -(-rows // self.largest) * self.largest)
-
-    def _hand_over(self) -> None:
-        with self._lock:
-            self._busy = bool(self._line)
-            if self._line:
-                heir = self._line.popleft()
-                heir.leads = True
-                heir.woken.set()
 
     def _try_buckets(self, call: "_Call") -> None:
         """Run the buckets, the least first, and keep those that work and, if they are measured, that pay."""
