@@ -1,6 +1,7 @@
 """Calls that meet become one run: who waits for whom, what a run holds, and whose failure is whose."""
 
 import logging
+import queue
 import signal
 import threading
 import time
@@ -275,9 +276,13 @@ def test_a_caller_that_leaves_with_the_network_in_its_hands_gives_it_to_the_next
             if (inputs["x"] == 9.0).any():
                 self.woken = Interrupted()
 
-    class Interrupted(threading.Event):
-        def wait(self, timeout: float | None = None) -> bool:
-            super().wait(timeout)
+    class Interrupted:
+        def __init__(self) -> None:
+            self._woken = queue.SimpleQueue()
+            self.put = self._woken.put
+
+        def get(self) -> None:
+            self._woken.get()
             raise Left
 
     network = Network()
