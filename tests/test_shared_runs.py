@@ -78,7 +78,7 @@ def test_rows_of_a_padded_run_are_those_of_single_runs(name: str) -> None:
         for spec in single.signature.inputs
     }
     together = shared.run(**inputs)
-    assert shared.shares_runs
+    assert shared.most_rows == 32
     for row in range(11):
         one = single.run(**{name: array[row : row + 1] for name, array in inputs.items()})
         for whole, wanted in zip(together, one, strict=True):
@@ -153,7 +153,7 @@ def test_a_network_that_takes_one_image_only_is_not_batched() -> None:
     fixed = OnnxModel(model.SerializeToString(), runtime=FORCED)
     x = np.ones((1, 3), np.float32)
     np.testing.assert_array_equal(fixed.run(x=x)[0], 2 * x)
-    assert not fixed.shares_runs
+    assert fixed.most_rows == 1
 
 
 def test_wrong_inputs_are_told_as_without_batches() -> None:
@@ -161,11 +161,11 @@ def test_wrong_inputs_are_told_as_without_batches() -> None:
     model.run(x=np.ones((2, 3), np.float32))
     with pytest.raises(BundleError, match=r"expected prior\.onnx to take x float32\[2, 4\]"):
         model.run(x=np.zeros((2, 4), np.float32))
-    assert model.shares_runs
+    assert model.most_rows == 32
 
 
 @pytest.mark.parametrize(
-    ("runtime", "shares"), [(Runtime(), False), (Runtime(buckets=(1,)), False), (FORCED, True)]
+    ("runtime", "most"), [(Runtime(), 1), (Runtime(micro_batches="on", buckets=(1, 2)), 2), (FORCED, 32)]
 )
-def test_runs_are_shared_only_where_it_is_said(runtime: Runtime, shares: bool) -> None:
-    assert OnnxModel(doubling_onnx(), runtime=runtime).shares_runs is shares
+def test_runs_are_shared_only_where_it_is_said(runtime: Runtime, most: int) -> None:
+    assert OnnxModel(doubling_onnx(), runtime=runtime).most_rows == most

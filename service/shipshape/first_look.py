@@ -93,7 +93,7 @@ def filled_up(inputs: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 def first_look(points_sight: Float32[np.ndarray, "n 3"], sight: SightFrame, model: OnnxModel) -> FirstLook:
     """Show the network the cluster."""
     inputs = network_inputs(points_sight, sight)
-    if model.shares_runs:  # with calls of the same shape alone, and most clusters have fewer points than CENTRES
+    if model.most_rows > 1:  # with calls of the same shape alone, and most clusters have fewer points than CENTRES
         inputs = filled_up(inputs)
     axis, shift, size, bow, classes = model.run(**{name: value[None] for name, value in inputs.items()})
     outward = cmath.rect(1.0, sight.bearing)

@@ -78,9 +78,9 @@ class OnnxModel:
             self._batches = MicroBatches(self._forward, label=label, buckets=runtime.buckets, measured=measured)
 
     @property
-    def shares_runs(self) -> bool:
-        """Whether calls from several threads become one run when they meet, if their shapes are the same."""
-        return self._batches is not None and self._batches.largest > 1
+    def most_rows(self) -> int:
+        """Rows up to which calls that meet become one run, if they are of one shape; 1 where none do."""
+        return 1 if self._batches is None else self._batches.largest
 
     def run(self, **inputs: np.ndarray) -> list[np.ndarray]:
         """The outputs, in the order of the signature, for inputs of its names, shapes and dtypes.
