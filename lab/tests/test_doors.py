@@ -53,7 +53,7 @@ def _load(folder):
 @pytest.fixture(scope="module")
 def doors():
     settings = Settings(rest_port=0, grpc_port=0, workers=1, default_timeout_ms=PATIENCE * 1e3)
-    service = Service(settings, load=_load, on_death=lambda: pytest.fail("a door died"))
+    service = Service(settings, 1, load=_load, on_death=lambda: pytest.fail("a door died"))
     with ExitStack() as stack:
         stack.callback(service.stop)
         addresses = service.start()

@@ -47,13 +47,24 @@ class Settings(BaseSettings):
         0,
         ge=0,
         le=1024,
-        description="What computes, processes or threads; 0: one a usable core. More of them share the same cores, "
-        "for higher latency and no more throughput.",
+        description="What computes, processes or threads: 0 is one a usable core, with a GPU as many threads as "
+        "fill two of its runs. More of them share the same cores: higher latency, no more throughput.",
     )
     compute: Compute = Field(
         Compute.PROCESSES,
         description="Where contacts are computed: in `processes` forked from one that holds the bundle, each with "
-        "an interpreter for itself, or in `threads` of the service, which share one: less memory, slower.",
+        "an interpreter for itself, or in `threads` of the service, which share one: less memory, slower. With a "
+        "GPU always in threads.",
+    )
+    provider: Literal["auto", "cpu", "cuda"] = Field(
+        "auto",
+        description="Where networks run. auto: on an NVIDIA GPU if shipshape[gpu] is installed and finds one, "
+        "else on the processor; cuda: the service does not start without a GPU. docs/gpu.md shows how.",
+    )
+    micro_batches: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether contacts that meet at a network share its runs, where they are computed in threads. "
+        "auto: as far as it is measured to pay at the start; a processor gains nothing. on is for measuring.",
     )
     queue_limit: int = Field(
         512,

@@ -51,6 +51,7 @@ def crew(executor):
 
 def started(executor, *arguments):
     crew = ProcessCrew(TOYS, *arguments)
+    crew.loaded()
     crew.prepared(lambda: False)
     crew.start(executor, executor.workers)
     executor.join(crew)
@@ -198,12 +199,13 @@ def test_a_preparation_that_fails_says_why():
     for what, error in (("refuse", Unprocessable), ("die", NotReady)):
         crew = ProcessCrew(TOYS, what)
         with pytest.raises(error):
-            crew.prepared(lambda: False)
+            crew.loaded()
         crew.close()
 
 
 def test_a_preparation_can_be_given_up():
     crew, stop = ProcessCrew(TOYS, "slow"), threading.Event()
+    crew.loaded()
     threading.Timer(0.2, stop.set).start()
     with pytest.raises(Cancelled):
         crew.prepared(stop.is_set)

@@ -57,11 +57,12 @@ def finish(work, ended):
     }
 
 
-def prepare(what=""):
+def prepare(loaded, what=""):
     if what == "refuse":
         raise Unprocessable("expected something to prepare, got nothing")
     if what == "die":
         os._exit(3)
+    loaded()
     if what == "slow":
         time.sleep(3600)
     return Prepared({"prepared": what}, make, Costs())

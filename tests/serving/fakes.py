@@ -186,6 +186,7 @@ def running(*, opened=True, load=None, **settings):
     }
     service = Service(
         Settings(**settings),
+        settings["workers"],
         load=load,
         on_death=lambda: pytest.fail("a door died"),
     )

@@ -18,7 +18,7 @@ import sys
 from serving.fakes import FakePipeline, fake_model
 from shipshape.serving import life
 from shipshape.settings import load_settings
-life.load_model = lambda settings, folder: fake_model(FakePipeline())
+life.load_model = lambda settings, runtime, folder: fake_model(FakePipeline())
 sys.exit(life.serve(load_settings()))
 """
 START_PATIENCE = 60.0

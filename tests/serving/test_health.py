@@ -111,7 +111,8 @@ def test_a_worker_that_dies_ends_life_and_readiness():
         doomed.join()
         watch = HealthStub(doors.channel).Watch(health_pb2.HealthCheckRequest(service="live"))
         assert next(watch).status == health_pb2.HealthCheckResponse.SERVING
-        doors.service.executor._threads.append(doomed)
+        doors.ask_grpc(cluster())
+        doors.service.executor._threads.hands[0].thread = doomed
         assert next(watch).status == health_pb2.HealthCheckResponse.NOT_SERVING, "nobody had to ask"
         assert told(doors) == (True, False, False)
         assert "shipshape_ready 0.0" in doors.rest.get("/metrics").text

@@ -28,7 +28,7 @@ def _leave_the_test_process_as_it_was(monkeypatch):
 
 @pytest.fixture
 def _fakes(monkeypatch):
-    monkeypatch.setattr(life, "load_model", lambda settings, folder: fake_model(FakePipeline()))
+    monkeypatch.setattr(life, "load_model", lambda settings, runtime, folder: fake_model(FakePipeline()))
 
 
 def test_a_missing_bundle(tmp_path, capsys):
@@ -47,7 +47,7 @@ def test_a_taken_port(door, capsys):
 
 @pytest.mark.usefixtures("_fakes")
 def test_a_bundle_that_fails_its_warm_up(monkeypatch, capsys):
-    monkeypatch.setattr(life, "load_model", lambda settings, folder: LocalModel(FAKE_BUNDLE, None, None))
+    monkeypatch.setattr(life, "load_model", lambda settings, runtime, folder: LocalModel(FAKE_BUNDLE, None, None))
     assert life.serve(Settings(rest_port=0, grpc_port=0)) == 1
     assert "expected bundle fake to answer the built-in contact, got " in capsys.readouterr().err
 

@@ -4,7 +4,9 @@ import os
 import socket
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from shipshape.errors import Cancelled, NotReady
@@ -30,24 +32,24 @@ class ForkServer:
             command = [sys.executable, "-P", "-m", "shipshape.executor.fork_server", str(descriptor)]
             self._process = subprocess.Popen(command, pass_fds=[descriptor], env={**os.environ, **ONE_THREAD})
         self.control.sendall(what)
-
-    def description(self, stopping: Callable[[], bool]) -> Any:
-        """Wait for what it says of its preparation; raises as `ProcessCrew.prepared` does."""
-        inbox = Inbox()
         self.control.settimeout(STOP_S)
-        while not stopping():
-            try:
-                messages = inbox.receive(self.control)
-            except TimeoutError:
-                continue
-            if messages is None:
-                raise NotReady("expected a process that loads the bundle, got one that ended before it had")
-            if messages:
-                self.control.settimeout(None)
-                if isinstance(messages[0], Exception):
-                    raise messages[0]
-                return messages[0]
-        raise Cancelled("expected to end the warm-up, got a signal to stop")
+        self._inbox = Inbox()
+        self._messages: deque[Any] = deque()
+
+    def message(self, stopping: Callable[[], bool]) -> Any:
+        """Wait for the next thing that it says of its preparation; raises as `ProcessCrew.prepared` does."""
+        while not self._messages:
+            if stopping():
+                raise Cancelled("expected to end the warm-up, got a signal to stop")
+            with suppress(TimeoutError):
+                came = self._inbox.receive(self.control)
+                if came is None:
+                    raise NotReady("expected a process that loads the bundle, got one that ended before it had")
+                self._messages.extend(came)
+        first = self._messages.popleft()
+        if isinstance(first, Exception):
+            raise first
+        return first
 
     def fork(self) -> socket.socket:
         """The connection to one more worker; raises OSError when the process has ended."""

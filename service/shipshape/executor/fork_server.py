@@ -1,8 +1,9 @@
 """The process that loads what the workers need, once, and forks them: they share its memory and start in no time.
 
 It runs as `python -m shipshape.executor.fork_server FD`, FD being its end of a socket pair. The first message says
-what to prepare; the reply describes it, or is the error. After that, each message that carries a socket is a
-request for one more worker at its other end. It has one thread, which is what makes it safe to fork.
+what to prepare; the replies are None when all is loaded, then a description of it, or an error instead. After that,
+each message that carries a socket is a request for one more worker at its other end. It has one thread, which is what
+makes it safe to fork.
 
 The processes end when the sockets close, however the service ends; signals are the service's matter.
 """
@@ -13,10 +14,14 @@ import pkgutil
 import signal
 import socket
 import sys
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from shipshape.executor.messages import Inbox, packed
 from shipshape.executor.process_worker import Prepared, as_message, be_worker
+
+LOADED = packed(None)
 
 
 def main(control: socket.socket) -> None:
@@ -25,12 +30,17 @@ def main(control: socket.socket) -> None:
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody asks how a worker ended: its socket tells that it did
     prepare, arguments = _first(control)
-    try:
-        prepared: Prepared = pkgutil.resolve_name(prepare)(*arguments)
-        control.sendall(packed(prepared.description))
-    except Exception as error:
-        control.sendall(packed(as_message(error)))
-        return
+    with suppress(OSError):  # the service ended meanwhile
+        try:
+            prepared: Prepared = pkgutil.resolve_name(prepare)(partial(control.sendall, LOADED), *arguments)
+            control.sendall(packed(prepared.description))
+        except Exception as error:
+            control.sendall(packed(as_message(error)))
+            return
+        _fork_for_all_that_come(control, prepared)
+
+
+def _fork_for_all_that_come(control: socket.socket, prepared: Prepared) -> None:
     gc.collect()
     gc.freeze()  # a collection in a worker would touch, and so copy, every page that it shares
     while True:

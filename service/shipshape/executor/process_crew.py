@@ -24,6 +24,7 @@ from shipshape.executor.process_worker import Report
 
 ENDED_S = 10.0  # without a word from a worker that has work, after which it is ended
 YOUNG_S = 1.0  # a worker that lived no longer is not replaced at once: the next one may end like it
+START_S = 10.0  # to wait for the first workers
 LOOK_S = 0.5  # between two looks for workers that are stuck
 
 _logger = logging.getLogger(__name__)
@@ -65,29 +66,35 @@ class ProcessCrew(Crew):
         self._owner: Owner
         self._missing_until = 0.0  # when the next worker may be forked in the place of one that is gone
         self._closing = False
+        self._whole = threading.Event()  # all workers have been there
         self._fresh: ForkServer | None = None  # in the place of one that died
         self._selector = selectors.DefaultSelector()
         self._woken, self._waker = socket.socketpair()
         self._waker.setblocking(False)
         self._thread = threading.Thread(target=self._serve, name="crew", daemon=True)
 
+    def loaded(self) -> None:
+        """Wait until the preparation has read what it needs; raises as `prepared` does."""
+        self._server.message(lambda: False)
+
     def prepared(self, stopping: Callable[[], bool]) -> Any:
-        """Wait for the preparation; its description.
+        """Wait for the rest of the preparation, after `loaded`; its description.
 
         Raises:
             Cancelled: `stopping` said so.
             NotReady: The process that prepares ended without a word.
             Exception: Whatever the preparation raises.
         """
-        return self._server.description(stopping)
+        return self._server.message(stopping)
 
     def start(self, owner: Owner, workers: int) -> None:
-        """Have the workers forked, once all is prepared."""
+        """Have the workers forked, once all is prepared, and wait for them."""
         self._owner, self._workers = owner, workers
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._selector.register(self._server.control, selectors.EVENT_READ)
         self._fill()
         self._thread.start()
+        self._whole.wait(START_S)
 
     @property
     def whole(self) -> bool:
@@ -157,6 +164,8 @@ class ProcessCrew(Crew):
             else:  # the first
                 hand.process_id = message
                 self._owner.give_out()
+                if self.whole:
+                    self._whole.set()
 
     def _end(self, hand: ProcessHand, report: Report) -> None:
         entry = hand.given[report.number]
@@ -203,7 +212,8 @@ class ProcessCrew(Crew):
     def _start_server(self) -> None:
         fresh = ForkServer(self._what)
         try:
-            fresh.description(lambda: self._closing)
+            for _ in ("loaded", "prepared"):
+                fresh.message(lambda: self._closing)
         except Exception:
             _logger.exception("workers that end will not be replaced")
             fresh.end()

@@ -1,6 +1,7 @@
 """What the process that forks workers does before: bundle -> pipeline -> tried out -> told to the service."""
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from shipshape.bundle import load_bundle
 from shipshape.errors import BundleError
 from shipshape.executor import Costs, Prepared, Task, rehearse
 from shipshape.pipeline import Pipeline
+from shipshape.providers import PROCESSOR, Runtime
 from shipshape.render import render_png
 from shipshape.sample import sample_contact
 from shipshape.serving.description import Description
@@ -25,16 +27,17 @@ from shipshape.validation import ContactLimits
 ENCODERS = (answers.encode, convert.encode_single, convert.encode_in_scan, convert.encode_in_stream)
 
 
-def load_local(folder: Path, max_points: int) -> LocalModel:
+def load_local(folder: Path, max_points: int, runtime: Runtime = PROCESSOR) -> LocalModel:
     """The bundle in `folder` and a pipeline for contacts of at most `max_points`; raises BundleError."""
-    bundle = load_bundle(folder)
+    bundle = load_bundle(folder, runtime)
     return LocalModel(bundle, Pipeline(bundle, ContactLimits(max_points=max_points)), render_png)
 
 
-def prepare(folder: Path, digest: str, max_points: int, log_level: str) -> Prepared:
+def prepare(loaded: Callable[[], None], folder: Path, digest: str, max_points: int, log_level: str) -> Prepared:
     """Load a bundle and try it out.
 
     Args:
+        loaded: Called when the bundle is read and verified.
         folder: Of the bundle.
         digest: That it must have: it may have been changed since the service looked.
         max_points: Of one contact.
@@ -49,6 +52,7 @@ def prepare(folder: Path, digest: str, max_points: int, log_level: str) -> Prepa
     model = load_local(folder, max_points)
     if model.bundle.digest != digest:
         raise BundleError(f"expected the bundle {digest}, got {model.bundle.digest}: it was changed meanwhile")
+    loaded()
     costs = Costs()
     model.try_out(lambda task: rehearse(task, costs, time.monotonic), lambda: False, ENCODERS)
 

@@ -54,7 +54,7 @@ class RemotePipeline:
 
 
 class RemoteModel:
-    """Its processes begin to load the bundle at once; `start` waits for them.
+    """Its processes have the bundle when it is made; `start` has them try it out.
 
     Args:
         folder: Of the bundle.
@@ -62,13 +62,19 @@ class RemoteModel:
         log_level: Of the processes.
 
     Raises:
-        BundleError: The folder holds no bundle; what is wrong with one is found by `start`.
+        BundleError: It cannot be used; what shows only in an answer is found by `start`.
+        NotReady: A process ended before it had read it.
     """
 
     def __init__(self, folder: Path, max_points: int, log_level: str) -> None:
         self.bundle = read_bundle(folder)
         self.pipeline: RemotePipeline
         self._crew = ProcessCrew(PREPARE, folder, self.bundle.digest, max_points, log_level)
+        try:
+            self._crew.loaded()
+        except BaseException:
+            self._crew.close()
+            raise
 
     def task(self, order: Order[C], deadline: float) -> Task[Any, Reply[C]]:
         """As `Model.task`; what is wrong with the points is found by the worker."""

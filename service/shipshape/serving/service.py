@@ -10,7 +10,7 @@ from prometheus_client import CollectorRegistry
 
 from shipshape.budget import Budget
 from shipshape.errors import Cancelled
-from shipshape.executor import Executor, usable_cores
+from shipshape.executor import Executor
 from shipshape.serving.access import load_access
 from shipshape.serving.admin.control import Control
 from shipshape.serving.core import Core
@@ -56,6 +56,7 @@ class Service:
 
     Args:
         settings: See there.
+        workers: What computes, processes or threads.
         load: Reads a bundle, for a swap.
         on_death: Called when a door ends without having been asked to.
 
@@ -63,8 +64,7 @@ class Service:
         SettingsError: A file of certificates or tokens cannot be used.
     """
 
-    def __init__(self, settings: Settings, *, load: Load, on_death: Callable[[], None]) -> None:
-        workers = settings.workers or usable_cores()
+    def __init__(self, settings: Settings, workers: int, *, load: Load, on_death: Callable[[], None]) -> None:
         limits = Limits(settings.max_body_bytes, settings.max_points, settings.max_contacts)
         timeouts = Timeouts(settings.default_timeout_ms, settings.budget_ms)
         self._settings = settings
