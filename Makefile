@@ -63,8 +63,8 @@ LOCK = UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --uni
   --generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links
 
 lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
-	@$(LOCK) pyproject.toml requirements/build.in --output-file requirements/service.lock
-	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest \
+	@$(LOCK) pyproject.toml requirements/build.in --extra otel --output-file requirements/service.lock
+	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest --extra otel \
 	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
 	@$(LOCK) requirements/clients.in --output-file requirements/clients.lock
 
