@@ -30,6 +30,7 @@ from shipshape.serving.life import serve as serve_until_signal
 from shipshape.serving.tokens import check_name, fresh_token, hash_of
 from shipshape.settings import SettingsError, load_settings
 from shipshape.tables import answer_line, columns, refusal_line, title_line
+from shipshape.tracing import traces
 from shipshape.types import ImageMethod, Options, Preset
 
 OK, REFUSED = 0, 1
@@ -41,7 +42,9 @@ def serve(arguments: argparse.Namespace) -> int:
     """Open the doors until a signal."""
     names = ("host", "rest_port", "grpc_port", "workers", "bundle")
     given = {name: value for name in names if (value := getattr(arguments, name)) is not None}
-    return serve_until_signal(load_settings(**given))
+    settings = load_settings(**given)
+    with traces(settings.traces_url, settings.traces_share):
+        return serve_until_signal(settings)
 
 
 def classify(arguments: argparse.Namespace) -> int:

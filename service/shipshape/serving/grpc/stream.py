@@ -200,6 +200,7 @@ class Stream:
                 if message.refusal is not None:
                     raise message.refusal
                 outcomes, stage_ms = conclude(message.scan, "grpc", self._metrics)
+                message.outcome.computed(stage_ms)
                 convert.add_results(response.results, message.contact_ids, outcomes, message.wishes)
                 response.stages.extend(convert.from_stage_ms(stage_ms))
             except Exception as error:

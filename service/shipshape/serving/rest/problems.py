@@ -30,7 +30,8 @@ RETRY_HEADER = "Shipshape-Retry-After-Ms"  # beside Retry-After, which knows who
 def identify(request: Request) -> str:
     """The request's id, in its problem document and in the log; the same however often it is asked for."""
     if not hasattr(request.state, "request_id"):
-        request.state.request_id = new_request_id(request.headers.get(ID_HEADER, ""))
+        headers = request.headers
+        request.state.request_id = new_request_id(headers.get(ID_HEADER, ""), headers.get("traceparent", ""))
     return str(request.state.request_id)
 
 
