@@ -52,8 +52,8 @@ class Span:
 
         Args:
             attributes: Of the request.
-            stage_ms: Milliseconds of each stage, in their order. Of several contacts they are sums: side by side on
-                several cores they may be longer than the request.
+            stage_ms: Milliseconds of each stage, in their order. Of several contacts they are sums, which work on
+                several cores may make longer than the request.
             computed_ns: When the last of them had ended, nanoseconds since 1970. They are laid end to end before
                 it; what lies between the request's begin and theirs is reading and waiting.
         """
