@@ -108,6 +108,7 @@ class Routes:
         await until_settled([ticket], request)
         answer = ticket.result()
         outcome.kind = outcome_of(answer)
+        outcome.computed(answer.recognition.stage_ms)
         return await _run(lambda: self._single(answer, wishes), small=not _bulky(wishes))
 
     async def _scan(self, request: Request, outcome: Outcome, share: Share) -> Response:
@@ -130,7 +131,7 @@ class Routes:
         outcome.urgent = wishes.lane is not Lane.BATCH
         await until_settled(scan.tickets, request)
         small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
-        return await _run(lambda: self._many(ids, scan, wishes), small=small)
+        return await _run(lambda: self._many(ids, scan, wishes, outcome), small=small)
 
     async def _parser(
         self, form: str, parse: Parse[T], body: bytes, query: Mapping[str, str], deadline: float
@@ -150,8 +151,9 @@ class Routes:
         capacity = self._core.capacity(asked.points, asked.lane)
         return _json(answers.to_bytes(answers.from_capacity(capacity, self._metrics.budget.report())))
 
-    def _many(self, ids: Sequence[str], scan: Scan, wishes: Wishes) -> Response:
+    def _many(self, ids: Sequence[str], scan: Scan, wishes: Wishes, outcome: Outcome) -> Response:
         outcomes, stage_ms = conclude(scan, "rest", self._metrics)
+        outcome.computed(stage_ms)
         return self._timed(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), stage_ms)
 
     def _single(self, answer: Answer, wishes: Wishes) -> Response:
