@@ -165,7 +165,7 @@ class Settings(BaseSettings):
         ge=0,
         le=1,
         description="Share of the requests to make spans of, where their callers have not decided it. Each costs "
-        "about half a millisecond of a core; the log names the trace of all.",
+        "a fraction of a millisecond of a core; the log names the trace of all.",
     )
 
     @model_validator(mode="after")

@@ -1,11 +1,13 @@
 """The real Prometheus, with the rules and the dashboard of deploy/, against a real service under real traffic."""
 
+import ast
 import json
 import re
 import shutil
 import subprocess
 import sys
 import time
+from typing import NamedTuple
 
 import httpx
 import pytest
@@ -85,6 +87,17 @@ def test_no_panel_lies_on_another():
     assert max(x for x, _ in cells) < 24
 
 
+class Ports(NamedTuple):
+    """Of a service under traffic."""
+
+    health: int
+    grpc: int
+
+
+def traffic(grpc_port, *more):
+    return [sys.executable, ROOT / "examples/traffic.py", f"127.0.0.1:{grpc_port}", "--hz", "2", *more]
+
+
 @pytest.fixture(scope="module")
 def service():
     if not (MODELS / "manifest.toml").is_file():
@@ -93,11 +106,9 @@ def service():
     process = start("-m", "shipshape", "serve", SHIPSHAPE_HEALTH_PORT=str(port))
     try:
         _, grpc_port = until_ready(process)
-        traffic = [sys.executable, ROOT / "examples/traffic.py", f"127.0.0.1:{grpc_port}", "--hz", "2"]
-        with subprocess.Popen(traffic, stdout=subprocess.PIPE) as playing:
-            yield port
+        with subprocess.Popen(traffic(grpc_port), stdout=subprocess.DEVNULL) as playing:
+            yield Ports(port, grpc_port)
             playing.terminate()
-            assert playing.wait(PATIENCE) == 0  # something was answered
     finally:
         process.kill()
         process.communicate()
@@ -114,7 +125,7 @@ def prometheus(service, tmp_path_factory):
     config["global"] = {"scrape_interval": "1s", "evaluation_interval": "1s"}
     (scraped,) = config["scrape_configs"]
     del scraped["dns_sd_configs"]  # there is no name server here
-    scraped["static_configs"] = [{"targets": [f"127.0.0.1:{service}"]}]
+    scraped["static_configs"] = [{"targets": [f"127.0.0.1:{service.health}"]}]
     (folder / "prometheus.yml").write_text(yaml.safe_dump(config))
     port = free_port()
     command = [PROMETHEUS, "--config.file=prometheus.yml", f"--web.listen-address=127.0.0.1:{port}"]
@@ -123,19 +134,30 @@ def prometheus(service, tmp_path_factory):
         httpx.Client(base_url=f"http://127.0.0.1:{port}/api/v1", trust_env=False, timeout=PATIENCE) as api,
     ):
         try:
+            until_answers(api)
             yield api
         finally:
             process.terminate()
+
+
+def until_answers(api):
+    """It reads its rules and its store first."""
+    end = time.monotonic() + START_PATIENCE
+    while time.monotonic() < end:
+        try:
+            if api.get("/status/runtimeinfo").status_code == httpx.codes.OK:
+                return
+        except httpx.TransportError:
+            pass
+        time.sleep(0.2)
+    pytest.fail("Prometheus did not start")
 
 
 def values(api, query):
     """What a query returns now, without what is not a number."""
     for name, value in VARIABLES.items():
         query = query.replace(name, value)
-    try:
-        answer = api.get("/query", params={"query": query}).json()
-    except httpx.TransportError:  # it is still starting
-        return []
+    answer = api.get("/query", params={"query": query}).json()
     assert answer["status"] == "success", f"{query}: {answer}"
     return [sample["value"][1] for sample in answer["data"]["result"] if sample["value"][1] != "NaN"]
 
@@ -149,10 +171,18 @@ def still_empty(api, asked):
     return empty
 
 
+def test_the_traffic_of_the_demo_is_answered(service):
+    played = subprocess.run(traffic(service.grpc, "--seconds", "3"), capture_output=True, text=True, check=False)
+    assert played.returncode == 0, played.stderr
+    seen = ast.literal_eval(played.stdout.splitlines()[-1])
+    assert seen["ok"] > 0
+    assert sum(seen.values()) % 6 == 0  # whole scans
+
+
 def test_promtool_takes_the_metrics_of_the_service(service):
     if PROMTOOL is None:
         pytest.skip("promtool is not installed")
-    metrics = httpx.get(f"http://127.0.0.1:{service}/metrics", trust_env=False).text
+    metrics = httpx.get(f"http://127.0.0.1:{service.health}/metrics", trust_env=False).text
     checked = promtool("check", "metrics", input=metrics)
     complaints = [
         line for line in checked.stderr.splitlines() if line.startswith("shipshape") and "_created" not in line
