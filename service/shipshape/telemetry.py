@@ -172,7 +172,8 @@ def _tell(door: str, method: str, outcome: Outcome, seconds: float, span: tracin
     if span is not None:
         attributes = {f"shipshape.{name}": value for name, value in fields.items()}
         attributes["shipshape.request_id"] = request_id.get()
-        span.end(attributes, outcome.stage_ms or {}, outcome.computed_ns)
+        failed = outcome.kind == INTERNAL
+        span.end(attributes, outcome.stage_ms or {}, outcome.computed_ns, failed=failed)
 
 
 class Workers(Protocol):

@@ -5,6 +5,7 @@ trace is taken from its `traceparent` (W3C Trace Context) either way, so that lo
 """
 
 import re
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,6 +14,8 @@ from importlib.metadata import version
 from typing import Any
 
 from shipshape.errors import SettingsError
+
+LAST_SPANS_S = 1.0  # that a stop waits for the collector to take what is left
 
 _TRACEPARENT = re.compile(r"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}(-.*)?")
 _parent: ContextVar[str] = ContextVar("traceparent", default="")
@@ -45,9 +48,12 @@ class Span:
         self._begun_ns = time.time_ns()
         self._span = tracer.start_span(name, parent, trace.SpanKind.SERVER, start_time=self._begun_ns)
         self._inside = trace.set_span_in_context(self._span, parent)
+        self._failed = trace.StatusCode.ERROR
         trace_id.set(f"{self._span.get_span_context().trace_id:032x}")
 
-    def end(self, attributes: Mapping[str, Any], stage_ms: Mapping[str, float], computed_ns: int) -> None:
+    def end(
+        self, attributes: Mapping[str, Any], stage_ms: Mapping[str, float], computed_ns: int, *, failed: bool
+    ) -> None:
         """End it, with a span for each stage.
 
         Args:
@@ -56,9 +62,12 @@ class Span:
                 several cores may make longer than the request.
             computed_ns: When the last of them had ended, nanoseconds since 1970. They are laid end to end before
                 it; what lies between the request's begin and theirs is reading and waiting.
+            failed: By a fault of the service.
         """
         if self._span.is_recording():
             self._span.set_attributes(attributes)
+            if failed:
+                self._span.set_status(self._failed)
             place = max(self._begun_ns, computed_ns - int(sum(stage_ms.values()) * 1e6))
             for name, milliseconds in stage_ms.items():
                 stage = self._tracer.start_span(f"stage {name}", self._inside, start_time=place)
@@ -84,7 +93,7 @@ def begin(name: str) -> Span | None:
 
 @contextmanager
 def traces(url: str | None, share: float) -> Iterator[None]:
-    """While the block runs, spans are sent to a collector; what is left of them when it ends.
+    """While the block runs, spans are sent to a collector, and what is left of them when it ends.
 
     Args:
         url: OTLP over HTTP, such as http://127.0.0.1:4318/v1/traces; None makes and sends none.
@@ -102,7 +111,10 @@ def traces(url: str | None, share: float) -> Iterator[None]:
         yield
     finally:
         _tracing.tracer = None
-        provider.shutdown()
+        # By itself it waits half a minute for a collector that does not answer; by then somebody sends SIGKILL.
+        closing = threading.Thread(target=provider.shutdown, name="last-spans", daemon=True)
+        closing.start()
+        closing.join(LAST_SPANS_S)
 
 
 def _provider(url: str, share: float) -> Any:

@@ -3,15 +3,21 @@ import logging
 import signal
 import subprocess
 import sys
+import threading
+from types import SimpleNamespace
 
 import httpx
 import pytest
+from opentelemetry.proto.trace.v1.trace_pb2 import Status
+from prometheus_client import CollectorRegistry
 
 from serving.collector import attributes, collecting
 from serving.fakes import PATIENCE, cluster, request, rows
 from serving.processes import MODELS, start, stopped_by, until_ready
+from shipshape import tracing
+from shipshape.budget import Budget
 from shipshape.errors import SettingsError
-from shipshape.telemetry import JsonLines, new_request_id
+from shipshape.telemetry import JsonLines, Metrics, new_request_id
 from shipshape.tracing import trace_id, traces
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -86,6 +92,29 @@ def test_a_refused_request_is_a_span_without_stages(doors, collector):
         doors.ask_rest(cluster(2))
     (root,) = collector.spans
     assert attributes(root)["shipshape.outcome"] in ("invalid_input", "unprocessable")
+
+
+def test_what_is_our_fault_is_marked_as_one(collector):
+    metrics = Metrics(CollectorRegistry(), Budget(0.05))
+    with traces(collector.url, 1.0):
+        with pytest.raises(RuntimeError), metrics.request("rest", "recognise"):
+            raise RuntimeError
+        with metrics.request("grpc", "recognise") as outcome:
+            outcome.kind = "overloaded"
+    assert {span.name: span.status.code for span in collector.spans} == {
+        "rest recognise": Status.STATUS_CODE_ERROR,
+        "grpc recognise": Status.STATUS_CODE_UNSET,
+    }
+
+
+def test_a_stop_does_not_wait_for_a_collector_that_never_answers(monkeypatch):
+    answers = threading.Event()
+    provider = SimpleNamespace(get_tracer=lambda name: None, shutdown=answers.wait)
+    monkeypatch.setattr(tracing, "_provider", lambda url, share: provider)
+    monkeypatch.setattr(tracing, "LAST_SPANS_S", 0.01)
+    with traces("http://127.0.0.1:1/v1/traces", 1.0):
+        pass  # would hang at its end
+    answers.set()
 
 
 def test_the_callers_trace_goes_on(doors, collector):
