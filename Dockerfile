@@ -19,9 +19,10 @@ COPY service service
 RUN /opt/shipshape/bin/pip install --no-build-isolation --no-deps --no-index . \
  && /opt/shipshape/bin/pip uninstall --yes editables hatchling pathspec pluggy trove-classifiers setuptools pip
 COPY models /opt/shipshape/bundles/default
-# Kernels are compiled here, for any processor of this architecture; the check runs each of them, and the networks.
+# Kernels are compiled here, for any processor of this architecture and with no feature that only this machine has;
+# the check runs each of them, and the networks.
 ARG NUMBA_CPU_NAME=generic
-ENV NUMBA_CPU_NAME=${NUMBA_CPU_NAME} NUMBA_CACHE_DIR=/opt/shipshape/kernels
+ENV NUMBA_CPU_NAME=${NUMBA_CPU_NAME} NUMBA_CPU_FEATURES="" NUMBA_CACHE_DIR=/opt/shipshape/kernels
 RUN /opt/shipshape/bin/shipshape check --bundle /opt/shipshape/bundles/default
 
 FROM ${BASE}
@@ -34,6 +35,7 @@ ARG NUMBA_CPU_NAME=generic
 ENV PATH=/opt/shipshape/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     NUMBA_CPU_NAME=${NUMBA_CPU_NAME} \
+    NUMBA_CPU_FEATURES="" \
     NUMBA_CACHE_DIR=/tmp/shipshape-kernels \
     SHIPSHAPE_BUNDLE=/opt/shipshape/bundles/default \
     SHIPSHAPE_HOST=0.0.0.0 \

@@ -61,7 +61,8 @@ def test_what_the_image_copies_is_not_ignored():
 
 
 def test_both_stages_compile_for_the_same_processor():
-    assert len(set(re.findall(r"^ARG (NUMBA_CPU_NAME=.*)$", DOCKERFILE, re.M))) == 1
+    for setting in ("ARG NUMBA_CPU_NAME=generic", "NUMBA_CPU_NAME=${NUMBA_CPU_NAME}", 'NUMBA_CPU_FEATURES=""'):
+        assert DOCKERFILE.count(setting) == 2, setting
 
 
 def test_no_container_of_the_compose_file_has_more_rights_than_it_needs():
@@ -83,3 +84,24 @@ def test_what_compose_mounts_is_there():
     folders = [mount.partition(":")[0] for mount in mounts if mount.startswith("./")]
     assert folders
     assert all((ROOT / folder).is_dir() for folder in folders)
+
+
+def test_grafana_looks_where_compose_mounts():
+    grafana = COMPOSE["services"]["grafana"]
+    mounted = {mount.split(":")[1]: mount.split(":")[0] for mount in grafana["volumes"]}
+    provisioned = ROOT / "deploy/grafana/provisioning"
+    (provider,) = yaml.safe_load((provisioned / "dashboards/shipshape.yml").read_text())["providers"]
+    dashboards = ROOT / mounted[provider["options"]["path"]]
+    home = Path(grafana["environment"]["GF_DASHBOARDS_DEFAULT_HOME_DASHBOARD_PATH"])
+    assert (dashboards / home.name).is_file()
+    assert str(home.parent) == provider["options"]["path"]
+    (source,) = yaml.safe_load((provisioned / "datasources/prometheus.yml").read_text())["datasources"]
+    host, port = re.fullmatch(r"http://(\w+):(\d+)", source["url"]).groups()
+    assert any(published.endswith(f":{port}") for published in COMPOSE["services"][host]["ports"])
+
+
+def test_prometheus_scrapes_the_health_port_of_the_service():
+    config = yaml.safe_load((ROOT / "deploy/prometheus/prometheus.yml").read_text())
+    (found,) = config["scrape_configs"][0]["dns_sd_configs"]
+    assert set(found["names"]) <= set(COMPOSE["services"])
+    assert f"SHIPSHAPE_HEALTH_PORT={found['port']}" in DOCKERFILE
