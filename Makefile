@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 EDITABLE := $(PIP) install --no-build-isolation --no-deps --no-index
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch clients lock hooks
+.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch clients lock hooks image
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,12 +59,15 @@ clients: $(VENV)/.clients ## install the clients of other makers that the tests 
 hooks: $(VENV)/.dev ## run the quick checks before each of your commits
 	@$(BIN)/pre-commit install
 
+image: ## build the container image and hold it to its promises, with docker or podman
+	@deploy/prove_image.sh
+
 LOCK = UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --universal --python-version 3.11 \
   --generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links
 
 lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
-	@$(LOCK) pyproject.toml requirements/build.in --output-file requirements/service.lock
-	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest \
+	@$(LOCK) pyproject.toml requirements/build.in --extra otel --output-file requirements/service.lock
+	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest --extra otel \
 	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
 	@$(LOCK) requirements/clients.in --output-file requirements/clients.lock
 

@@ -9,7 +9,7 @@ import argparse
 import importlib.metadata
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
@@ -57,10 +57,8 @@ times are written as 50ms, 2s or 1m
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     arguments = build_parser().parse_args(argv)
-    from shipshape.commands import COMMANDS  # noqa: PLC0415  its libraries take a second, --help must not wait
-
     try:
-        code = COMMANDS[arguments.command](arguments)
+        code = _command(arguments.command)(arguments)
         sys.stdout.flush()
         return code
     except BrokenPipeError:
@@ -72,6 +70,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ShipshapeError as error:
         print(f"shipshape: {error}", file=sys.stderr)
         return UNUSABLE
+
+
+def _command(name: str) -> Callable[[argparse.Namespace], int]:
+    """What carries it out; its libraries take up to a second to import, for which --help must not wait."""
+    if name == "serve":
+        from shipshape.serve import serve  # noqa: PLC0415
+
+        return serve
+    from shipshape.commands import COMMANDS  # noqa: PLC0415
+
+    return COMMANDS[name]
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -178,6 +178,19 @@ class Settings(BaseSettings):
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         "info", description="Least severe log line written; debug adds one line a request."
     )
+    traces_url: str | None = Field(
+        None,
+        pattern="^https?://",
+        description="Collector of OpenTelemetry that spans are sent to, OTLP over HTTP, such as "
+        "http://127.0.0.1:4318/v1/traces; needs the extra shipshape[otel]. None makes no spans and sends nothing.",
+    )
+    traces_share: float = Field(
+        1.0,
+        ge=0,
+        le=1,
+        description="Share of the requests to make spans of, where their callers have not decided it. Each costs "
+        "a fraction of a millisecond of a core; the log names the trace of all.",
+    )
 
     @model_validator(mode="after")
     def _a_scan_fits_the_queue(self) -> "Settings":

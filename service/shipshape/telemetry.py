@@ -7,7 +7,7 @@ import logging
 import random
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from typing import Any, Protocol, TypeVar
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector
 
+from shipshape import tracing
 from shipshape.budget import WINDOWS, Budget, Level
 from shipshape.histogram import BulkHistogram
 
@@ -36,8 +37,9 @@ request_id: ContextVar[str] = ContextVar("request_id", default="")
 _logger = logging.getLogger(__name__)
 
 
-def new_request_id(proposed: str = "") -> str:
-    """The caller's own id if it is harmless in a log, else a fresh one; set for the current context."""
+def new_request_id(proposed: str = "", traceparent: str = "") -> str:
+    """The caller's own id if it is harmless in a log, else a fresh one; set for this context, as is its trace."""
+    tracing.follow(traceparent)
     harmless = 0 < len(proposed) <= 64 and all(char.isalnum() or char in "-_.:" for char in proposed)
     # Not the system's random bytes: asking for them hands the interpreter's lock to others, for no gain here.
     chosen = proposed if harmless and proposed.isascii() else f"{random.getrandbits(64):016x}"
@@ -52,6 +54,12 @@ class Outcome:
     kind: str = OK
     contacts: int = 0  # that the request brought, as soon as it is known
     urgent: bool = True  # held to the budget, which work of the batch lane is not
+    stage_ms: Mapping[str, float] | None = None  # once they are known, over all contacts
+    computed_ns: int = 0  # when that was, since 1970
+
+    def computed(self, stage_ms: Mapping[str, float]) -> None:
+        """The stages have ended, just now."""
+        self.stage_ms, self.computed_ns = stage_ms, time.time_ns()
 
 
 class Metrics:
@@ -136,6 +144,7 @@ class Metrics:
         start = time.perf_counter() - waited
         in_flight = self._in_flight(door)
         in_flight.inc()
+        span = tracing.begin(f"{door} {method}")
         try:
             yield outcome
         except BaseException as error:
@@ -151,7 +160,22 @@ class Metrics:
             if method in RECOGNISING and outcome.urgent and outcome.kind in HELD:
                 inside = self.budget.tell(seconds, answered=outcome.kind in (OK, DEGRADED))
                 self._held(str(inside).lower()).inc()
-            _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
+            _tell(door, method, outcome, seconds, span)
+
+
+def _tell(door: str, method: str, outcome: Outcome, seconds: float, span: tracing.Span | None) -> None:
+    """One line in the log, if it takes any so fine, and the end of the span, if there is one."""
+    if span is None and not _logger.isEnabledFor(logging.DEBUG):
+        return
+    fields = {"door": door, "method": method, "outcome": str(outcome.kind), "contacts": outcome.contacts}
+    text = "%s %s %s %.2f ms"
+    extra = {"fields": {**fields, "ms": round(seconds * 1e3, 3)}}
+    _logger.debug(text, door, method, outcome.kind, seconds * 1e3, extra=extra)
+    if span is not None:
+        attributes = {f"shipshape.{name}": value for name, value in fields.items()}
+        attributes["shipshape.request_id"] = request_id.get()
+        failed = outcome.kind == INTERNAL
+        span.end(attributes, outcome.stage_ms or {}, outcome.computed_ns, failed=failed)
 
 
 def _children(
@@ -218,13 +242,16 @@ def _burn(budget: Budget, window: str) -> float:
 
 
 class JsonLines(logging.Formatter):
-    """One JSON object a line: time (UTC), level, logger, message, request_id, traceback."""
+    """One JSON object a line: time (UTC), level, logger, message, request_id, trace_id, more, traceback.
+
+    What more there is of a request: door, method, outcome, contacts, ms.
+    """
 
     converter = staticmethod(time.gmtime)
 
     def format(self, record: logging.LogRecord) -> str:
         """The record as one line of JSON."""
-        line = {
+        line: dict[str, Any] = {
             "time": f"{self.formatTime(record, '%Y-%m-%dT%H:%M:%S')}.{int(record.msecs):03d}Z",
             "level": record.levelname.lower(),
             "logger": record.name,
@@ -232,6 +259,9 @@ class JsonLines(logging.Formatter):
         }
         if request_id.get():
             line["request_id"] = request_id.get()
+        if tracing.trace_id.get():
+            line["trace_id"] = tracing.trace_id.get()
+        line |= getattr(record, "fields", {})
         if record.exc_info:
             line["traceback"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False)

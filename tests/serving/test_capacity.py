@@ -6,9 +6,11 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from serving.fakes import PATIENCE, cluster, request, running
 from shipshape.executor.admission import HEADROOM
+from shipshape.serving.grpc.guard import Call, current_call
 from shipshape.serving.grpc.servicer import Servicer
 from shipshape.serving.load_report import as_message
 from shipshape.serving.timing import Timeouts
+from shipshape.telemetry import Outcome
 from shipshape.v1 import shipshape_pb2 as pb
 
 POINTS = cluster()
@@ -119,6 +121,7 @@ def test_every_answer_carries_the_load(doors):
     text = doors.ask_rest(POINTS).headers["endpoint-load-metrics"]
     assert text == "TEXT application_utilization=0.000"
     context, core, metrics = Context(), doors.service._core, doors.service._metrics
+    current_call.set(Call(Outcome(), None))
     Servicer(core, metrics, Timeouts(), doors.service._grpc._streams).Recognise(request(POINTS), context)
     report = orca().FromString(context.trailing["endpoint-load-metrics-bin"])
     assert 0.0 <= report.application_utilization <= 1.0

@@ -142,8 +142,8 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 def identify(context: grpc.ServicerContext) -> None:
     """Give the call its id, in its trailing metadata and in the log: the caller's own, else a fresh one."""
     metadata = dict(context.invocation_metadata() or ())
-    proposed = metadata.get("x-request-id", "")
-    new_request_id(proposed if isinstance(proposed, str) else "")
+    proposed, traceparent = metadata.get("x-request-id", ""), metadata.get("traceparent", "")
+    new_request_id(proposed if isinstance(proposed, str) else "", str(traceparent))
 
 
 def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str | bytes]) -> None:

@@ -112,4 +112,5 @@ def cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -
 
 def set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float], load: float) -> None:
     """Trailing metadata: the milliseconds of each stage, the load and the request's id."""
+    current_call.get().outcome.computed(stage_ms)
     set_trailing(context, ("server-timing", server_timing(stage_ms)), (GRPC_TRAILER, as_message(load)))

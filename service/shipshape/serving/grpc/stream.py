@@ -199,6 +199,7 @@ class Stream:
                 if message.refusal is not None:
                     raise message.refusal
                 outcomes, stage_ms = conclude(message.scan, "grpc", self._metrics)
+                message.outcome.computed(stage_ms)
                 results = convert.joined(pb.RecogniseStreamResponse, message.contact_ids, outcomes)
                 stages = convert.from_stage_ms(stage_ms)
                 rest = pb.RecogniseStreamResponse(sequence=message.sequence, stages=stages)

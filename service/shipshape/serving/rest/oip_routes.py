@@ -135,6 +135,7 @@ class OipRoutes:
 
     def _answer(self, model: Model, asked: Asked, inference: Inference, outcome: Outcome) -> Response:
         tensors, stage_ms = inference.conclude(DOOR, self._metrics, outcome)
+        outcome.computed(stage_ms)
         fields = {"model_name": models.NAME, "model_version": models.version_of(model)}
         content, json_bytes = write_answer(fields, tensors, asked)
         headers = {"Server-Timing": server_timing(stage_ms), HTTP_HEADER: as_text(self._core.load())}

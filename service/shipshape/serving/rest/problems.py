@@ -26,6 +26,7 @@ STATUS = {
 MEDIA_TYPE = "application/problem+json"
 ID_HEADER = "X-Request-Id"
 ID_NAME = ID_HEADER.lower().encode()  # as it stands among the bytes
+TRACE_NAME = b"traceparent"
 RETRY_HEADER = "Shipshape-Retry-After-Ms"  # beside Retry-After, which knows whole seconds only
 
 
@@ -33,8 +34,10 @@ def identify(scope: Scope) -> str:
     """The request's id, in its problem document and in the log; the same however often it is asked for."""
     state = scope.setdefault("state", {})
     if "request_id" not in state:
-        proposed = next((value for name, value in scope["headers"] if name == ID_NAME), b"")
-        state["request_id"] = new_request_id(proposed.decode("latin-1"))
+        given = {
+            name: value.decode("latin-1") for name, value in scope["headers"] if name in (ID_NAME, TRACE_NAME)
+        }
+        state["request_id"] = new_request_id(given.get(ID_NAME, ""), given.get(TRACE_NAME, ""))
     return str(state["request_id"])
 
 

@@ -118,6 +118,7 @@ class Routes:
         await until_settled([ticket], incoming)
         reply = ticket.result()
         outcome.kind = outcome_of(reply)
+        outcome.computed(reply.stage_ms)
         return self._timed(reply.content, reply.stage_ms)
 
     async def _scan(self, incoming: Incoming, outcome: Outcome, share: Share) -> Response:
@@ -143,6 +144,7 @@ class Routes:
         outcome.urgent = wishes.lane is not Lane.BATCH
         await until_settled(scan.tickets, incoming)
         outcomes, stage_ms = conclude(scan, "rest", self._metrics)
+        outcome.computed(stage_ms)
         return self._timed(answers.joined(ids, outcomes), stage_ms)
 
     async def _parser(
