@@ -2,8 +2,8 @@
 
 It runs as `python -m shipshape.executor.fork_server FD`, FD being its end of a socket pair. The first message
 says what to prepare; the replies are None when all is loaded, then a description of it, or an error instead. After
-that, each message that carries a socket is a request for one more worker at its other end. It has one thread, which
-is what makes it safe to fork.
+that, each message that carries a socket is a request for one more worker at its other end. It has one thread,
+which is what makes it safe to fork.
 
 The processes end when the sockets close, however the service ends; signals are the service's matter.
 """
