@@ -10,6 +10,7 @@ from fastapi import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from shipshape import console
 from shipshape.errors import Unauthenticated
 from shipshape.serving.access import Access
 from shipshape.serving.faults import fault_of
@@ -29,7 +30,7 @@ class Doorkeeper:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """The application's answer, or 401."""
-        if scope["type"] == "http" and scope["path"] not in OPEN:
+        if scope["type"] == "http" and scope["path"] not in OPEN and not console.is_open(scope["path"]):
             request = Request(scope)
             address = request.client.host if request.client else ""
             certificate = getattr(request.state, "certificate", None)
