@@ -52,5 +52,6 @@ export interface Recognition {
   bundle: string;
   stage_ms: Record<string, number>;
   restored?: { points: Triple[]; measured: boolean[] };
-  images?: { before: string; after: string; descriptors?: string[] } | null;
+  images?: { before: string; after: string } | null;
+  descriptors?: string[] | null;
 }

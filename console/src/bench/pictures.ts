@@ -24,7 +24,7 @@ export async function showPictures(answer: Recognition): Promise<void> {
   );
   const legend = `Blue, green and red hold the layers ${layers}; black is empty.`;
   byId("images").replaceChildren(pair, make("p", { className: "quiet" }, legend));
-  await showDescriptors(images.descriptors ?? []);
+  await showDescriptors(answer.descriptors ?? []);
 }
 
 async function showDescriptors(descriptors: string[]): Promise<void> {
