@@ -189,11 +189,10 @@ async function show(chosen: Cluster, said: Recognition | null): Promise<void> {
 
 async function openScene(): Promise<void> {
   if (scene) return;
-  try {
+  if (document.createElement("canvas").getContext("webgl2")) {
     const { Scene3d: Made } = await import("./scene");
     scene ??= new Made(byId("scene"), isShown);
-  } catch (error) {
-    console.warn(error);
+  } else {
     const text = "This browser draws no 3D: expected WebGL, got none. Everything else works without it.";
     byId("scene").replaceChildren(make("p", { className: "empty" }, text));
   }
