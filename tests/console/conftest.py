@@ -6,6 +6,7 @@ import signal
 from contextlib import contextmanager
 
 import pytest
+from playwright.sync_api import expect, sync_playwright
 
 from serving.processes import MODELS, start, stopped_by, until_ready
 from shipshape import console
@@ -20,31 +21,35 @@ OFFLINE = re.compile(
 
 
 @pytest.fixture(scope="session")
-def browser():
+def chromium():
     if not console.built():
         pytest.skip("the console is not built: make console")
     if CHROMIUM is None:
         pytest.skip("chromium is not installed")
-    playwright = pytest.importorskip("playwright.sync_api")
-    playwright.expect.set_options(timeout=PATIENCE_MS)
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=CHROMIUM, args=GRAPHICS)
+    return CHROMIUM
+
+
+@pytest.fixture(scope="module")  # no longer: its event loop runs in this thread, and others want one of their own
+def browser(chromium):
+    expect.set_options(timeout=PATIENCE_MS)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=GRAPHICS)
         yield browser
         browser.close()
 
 
 @pytest.fixture(scope="session")
-def address(browser):
+def address(chromium):
     """Where the real service listens, with the default bundle."""
     if not (MODELS / "manifest.toml").is_file():
         pytest.skip("models/ has no manifest.toml yet")
-    process = start("-m", "shipshape", "serve", SHIPSHAPE_BUNDLE=str(MODELS))
-    rest_port, _ = until_ready(process)
-    yield f"http://127.0.0.1:{rest_port}/"
-    stopped_by(process, signal.SIGTERM)
+    with start("-m", "shipshape", "serve", SHIPSHAPE_BUNDLE=str(MODELS)) as process:
+        rest_port, _ = until_ready(process)
+        yield f"http://127.0.0.1:{rest_port}/"
+        stopped_by(process, signal.SIGTERM)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def opened(browser):
     """Opens the console at an address, in a browser of its own kind."""
 

@@ -2,6 +2,7 @@
 
 import re
 import signal
+from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import expect
@@ -18,9 +19,7 @@ def state(page, said):
 
 
 def test_a_lost_connection_is_shown_and_comes_back(opened):
-    process = start("-c", SERVE_FAKES)
-    port, _ = until_ready(process)
-    with opened(f"http://127.0.0.1:{port}/", "live") as page:
+    with start("-c", SERVE_FAKES) as process, start_page(opened, process) as (page, port):
         state(page, "Ready")
         stopped_by(process, signal.SIGTERM)
         lost = page.get_by_role("alert").filter(has_text="No connection to the service since")
@@ -29,12 +28,20 @@ def test_a_lost_connection_is_shown_and_comes_back(opened):
         page.get_by_role("link", name="Bench").click()
         page.get_by_role("button", name=re.compile("RHIB")).click()
         expect(page.locator("#problem")).to_contain_text("expected an answer from the service, got none")
-        process = start("-c", SERVE_FAKES, SHIPSHAPE_REST_PORT=str(port))
-        until_ready(process)
-        expect(lost).to_be_hidden()
-        state(page, "Ready")
-        expect(page.locator("#problem")).to_be_hidden()
-    stopped_by(process, signal.SIGTERM)
+        with start("-c", SERVE_FAKES, SHIPSHAPE_REST_PORT=str(port)) as again:
+            until_ready(again)
+            expect(lost).to_be_hidden()
+            state(page, "Ready")
+            expect(page.locator("#problem")).to_be_hidden()
+            stopped_by(again, signal.SIGTERM)
+
+
+@contextmanager
+def start_page(opened, process):
+    """The live view of a service that has just been started, and the port it got."""
+    port, _ = until_ready(process)
+    with opened(f"http://127.0.0.1:{port}/", "live") as page:
+        yield page, port
 
 
 @pytest.fixture

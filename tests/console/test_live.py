@@ -19,7 +19,7 @@ def test_what_was_asked_is_counted(opened, address):
         expect(page.locator("#tile-rate")).to_have_text("0 /s")  # two readings, and nothing between them
         for _ in range(ASKED):
             client.post("/v1/recognise", json={"points": cluster().astype(float).tolist()}).raise_for_status()
-        page.get_by_label("Over the last").select_option("5 min")
+        page.get_by_role("combobox", name="Over the last").select_option("5 min")
         expect(page.locator("#tile-rate")).not_to_have_text("0 /s")
         model = client.get("/v1/model").json()
         capacity = client.get("/v1/capacity").json()
@@ -36,8 +36,8 @@ def test_what_was_asked_is_counted(opened, address):
 def test_a_capacity_is_asked_for_as_chosen(opened, address):
     with opened(address, "live") as page:
         page.locator("#promise-rows tr").first.wait_for()
-        page.get_by_label("Points").fill("4000")
-        page.get_by_label("Lane").first.select_option("collision")
+        page.get_by_role("spinbutton", name="Points").fill("4000")
+        page.get_by_role("combobox", name="Lane").select_option("collision")
         with page.expect_request(re.compile(r"v1/capacity\?points=4000&lane=collision")):
             pass
 

@@ -36,6 +36,7 @@ def test_the_colours_follow_the_system_until_the_user_chooses(opened, address):
     with opened(address, color_scheme="light") as page:
         assert ground(page) > 200
         page.emulate_media(color_scheme="dark")
+        expect(page.locator("html")).to_have_attribute("data-theme", "dark")
         assert ground(page) < 60
         page.get_by_label("Colours").select_option("Light")
         assert ground(page) > 200

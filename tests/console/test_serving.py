@@ -1,16 +1,12 @@
 """What the REST door serves of the console, without a browser."""
 
-import asyncio
 import re
 from html.parser import HTMLParser
 
-import httpx
 import pytest
-from fastapi import FastAPI
 
-from serving.fakes import doors
+from serving.fakes import doors, running
 from shipshape import console
-from shipshape.serving.rest.console_routes import add_console
 
 __all__ = ["doors"]
 
@@ -73,14 +69,10 @@ def test_the_licences_of_what_it_bundles_come_with_it(doors):
     assert {"fflate", "three", "uplot"} <= set(re.findall(r"^(\S+) \d+\.\d+\.\d+$", text, re.M))
 
 
-def test_without_a_build_the_page_says_so():
-    app = FastAPI()
-    add_console(app, None)
-
-    async def asked():
-        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://console") as client:
-            return await client.get("/")
-
-    missing = asyncio.run(asked())
+def test_without_a_build_the_page_says_so(monkeypatch):
+    monkeypatch.setattr(console, "built", lambda: None)
+    with running() as doors:
+        missing = doors.rest.get("/")
+        assert doors.rest.get("/console/main.js").status_code == 404
     assert missing.status_code == 404
     assert missing.json()["detail"].startswith("expected the console in this installation, got one without it")

@@ -82,7 +82,7 @@ function startChoosing(): void {
   byId<HTMLSelectElement>("cluster").addEventListener("change", (event) => {
     chooseOfFile(Number((event.target as HTMLSelectElement).value));
   });
-  void showSamples((sample) => choose(sample)).catch(showProblem);
+  showSamples((sample) => choose(sample), showProblem).catch(showProblem);
 }
 
 async function openFile(file: File): Promise<void> {
