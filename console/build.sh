@@ -1,6 +1,6 @@
 #!/bin/sh
 # Builds the console into service/shipshape/console/static, from which the service and its wheel take it.
-# Needs Node.js 20 or newer with npm; what package-lock.json names is installed the first time and when it changed.
+# Needs Node.js 18 or newer with npm; what package-lock.json names is installed the first time and when it changed.
 set -eu
 cd "$(dirname "$0")"
 command -v npm >/dev/null || {

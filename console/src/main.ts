@@ -6,6 +6,7 @@ import { byId, make, write } from "./dom";
 import { paintLive, readLive, showLive, showModel } from "./live/live";
 import { json, Problem, Unreachable } from "./service";
 import { followTheme } from "./theme";
+import { clock } from "./units";
 
 const BEAT_MS = 1000;
 const VIEWS = ["live", "bench"];
@@ -88,7 +89,7 @@ function showState(tone: string, said: string): void {
 function showLost(): void {
   lostAt ??= new Date();
   showState("bad", "No connection");
-  const since = lostAt.toLocaleTimeString();
+  const since = clock(lostAt);
   write(
     "lost",
     `No connection to the service since ${since}. What you see is from before; it is tried again every second.`,

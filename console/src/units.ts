@@ -30,6 +30,11 @@ export function degrees(radians: number): string {
   return `${((radians * 180) / Math.PI).toFixed(1)}°`;
 }
 
+/** A time of the day, of 24 hours as on every bridge. */
+export function clock(moment: Date): string {
+  return moment.toLocaleTimeString("en-GB");
+}
+
 /** Names of the contract as words: without_restoration. */
 export function words(name: string): string {
   return name.replaceAll("_", " ");

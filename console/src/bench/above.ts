@@ -27,8 +27,9 @@ export function drawAbove(cluster: Cluster, answer: Recognition): void {
   ];
   drawSight(context, at, answer);
   const parts = partsOf(answer, cluster);
+  drawCloud(context, at, cluster.points, "raw", 1.4);
   drawCloud(context, at, parts.inferred, "inferred", 1.3);
-  drawCloud(context, at, parts.measured, isShown("measured") ? "measured" : "raw", 1.8);
+  drawCloud(context, at, parts.measured, "measured", 1.8);
   if (isShown("box")) drawBox(context, at, corners, [wings[0], bow, wings[1]]);
   drawKeypoints(context, at, answer);
   drawScale(context, scale);

@@ -113,7 +113,6 @@ function choose(chosen: Cluster, fromSamples = true): void {
   if (fromSamples) byId("which").hidden = true;
   if (fromSamples) byId<HTMLInputElement>("height").value = String(chosen.sensorHeight ?? "");
   cluster = chosen;
-  write("chosen", `${chosen.name}, ${chosen.points.length / 3} points`);
   byId<HTMLButtonElement>("recognise").disabled = false;
   void recognise();
 }
@@ -123,7 +122,8 @@ async function recognise(): Promise<void> {
   const mine = ++turn;
   const sent = request(cluster);
   clearProblem();
-  byId("results").classList.add("old");
+  age(true);
+  write("chosen", `${described(cluster)}: asking the service`);
   await show(cluster, null);
   try {
     const started = performance.now();
@@ -132,7 +132,19 @@ async function recognise(): Promise<void> {
     await showAnswer(sent, said, performance.now() - started);
   } catch (error) {
     if (mine === turn) showProblem(error);
+    for (const id of ["results", "verdict"]) byId(id).hidden ||= mine === turn; // of another cluster, or another way
+  } finally {
+    if (mine === turn) write("chosen", described(cluster));
   }
+}
+
+function described({ name, points }: Cluster): string {
+  return `${name}, ${points.length / 3} points`;
+}
+
+/** Fades what was said of the cluster before. */
+function age(old: boolean): void {
+  for (const id of ["results", "verdict"]) byId(id).classList.toggle("old", old);
 }
 
 function request(chosen: Cluster): Sent {
@@ -160,7 +172,7 @@ async function ask({ cluster: { points }, query, timeoutMs }: Sent): Promise<Rec
 
 async function showAnswer(sent: Sent, said: Recognition, roundTripMs: number): Promise<void> {
   byId("results").hidden = false;
-  byId("results").classList.remove("old");
+  age(false);
   showVerdict(said);
   showClasses(said);
   showTimes(said, model.limits.budget_ms, roundTripMs);

@@ -45,7 +45,8 @@ async function showDescriptors(descriptors: string[]): Promise<void> {
   });
   const legend =
     "The neighbourhood of each keypoint on a sphere: elevation down from the zenith, azimuth across, the bow in the " +
-    "middle. Occupied near, in the middle and far; distance of the nearest; depth of what lies there.";
+    "middle. Near, middle and far: what is occupied there. Distance: how near the nearest is. Diameter: how deep " +
+    "what lies in that direction is.";
   byId("descriptors").replaceChildren(...(await Promise.all(blocks)), make("p", { className: "quiet" }, legend));
 }
 

@@ -25,6 +25,7 @@ import { bounds, type Cluster, outline, partsOf } from "./clouds";
 import { listenToKeys } from "./keys";
 import type { Layer } from "./layers";
 
+const AXES = [0, 1, 2] as const;
 const FOV_DEG = 36;
 const GRID_M = 5;
 
@@ -66,12 +67,13 @@ export class Scene3d {
   /** Shows a cluster, and what was made of it. */
   show(cluster: Cluster, answer: Recognition | null): void {
     const parts = answer ? partsOf(answer, cluster) : null;
-    const { least, most } = bounds(parts ? joined(parts.measured, parts.inferred) : cluster.points);
-    this.middle = [0, 1, 2].map((axis) => (least[axis as 0] + most[axis as 0]) / 2) as Triple;
-    this.radius = Math.max(2, Math.hypot(...[0, 1, 2].map((axis) => most[axis as 0] - least[axis as 0])) / 2);
+    const frame = Float32Array.from(answer ? ends(answer) : []);
+    const { least, most } = bounds(joined(cluster.points, parts?.inferred ?? new Float32Array(), frame));
+    this.middle = AXES.map((axis) => (least[axis] + most[axis]) / 2) as Triple;
+    this.radius = Math.max(2, Math.hypot(...AXES.map((axis) => most[axis] - least[axis])) / 2);
     this.heading = answer?.heading ?? Math.atan2(this.middle[1], this.middle[0]) + Math.PI / 2;
     const water = answer ? answer.box.center[2] - answer.box.height / 2 : least[2];
-    this.put("raw", this.cloud(cluster.points, "raw", 2.5));
+    this.put("raw", this.cloud(cluster.points, "raw", 3.5));
     this.put("measured", this.cloud(parts?.measured ?? new Float32Array(), "measured", 4));
     this.put("inferred", this.cloud(parts?.inferred ?? new Float32Array(), "inferred", 3));
     this.put("keypoint", this.cloud(Float32Array.from((answer?.keypoints ?? []).flat()), "keypoint", 13));
@@ -83,9 +85,6 @@ export class Scene3d {
   /** Turns the layers on and off. */
   layer(): void {
     for (const [name, object] of this.layers) object.visible = this.isShown(name);
-    const raw = this.layers.get("raw");
-    // The measured points are those of the cluster: drawn twice, one colour would hide the other.
-    if (raw && this.pointsOf("measured") > 0 && this.isShown("measured")) raw.visible = false;
     this.draw();
   }
 
@@ -106,18 +105,13 @@ export class Scene3d {
     this.draw();
   }
 
-  private pointsOf(name: Layer): number {
-    const object = this.layers.get(name);
-    return object instanceof Points ? object.geometry.getAttribute("position").count : 0;
-  }
-
   private put(name: Layer, object: Object3D): void {
     const old = this.layers.get(name);
-    old?.traverse(
-      (part) =>
-        (part instanceof Points || part instanceof Mesh || part instanceof LineSegments) &&
-        part.geometry.dispose(),
-    );
+    old?.traverse((part) => {
+      if (!(part instanceof Points || part instanceof Mesh || part instanceof LineSegments)) return;
+      part.geometry.dispose();
+      part.material.dispose();
+    });
     if (old) this.scene.remove(old);
     this.layers.set(name, object);
     this.scene.add(object);
@@ -129,6 +123,7 @@ export class Scene3d {
     const ratio = this.renderer.getPixelRatio();
     const color = new Color(colour(tone));
     const onTop = tone === "keypoint";
+    const order: Partial<Record<Layer, number>> = { raw: -1, keypoint: 1 }; // measured points cover the raw ones
     const cloud = new Points(
       geometry,
       new PointsMaterial({
@@ -140,7 +135,7 @@ export class Scene3d {
         depthTest: !onTop,
       }),
     );
-    cloud.renderOrder = onTop ? 1 : 0;
+    cloud.renderOrder = order[tone] ?? 0;
     return cloud;
   }
 
@@ -198,6 +193,13 @@ export class Scene3d {
       this.renderer.render(this.scene, this.camera);
     });
   }
+}
+
+/** Two corners of the box and the tip at its bow, packed x y z: what must fit into the picture. */
+function ends(answer: Recognition): number[] {
+  const { corners, bow } = outline(answer);
+  const { center, height } = answer.box;
+  return [...corners, bow].flatMap(([x, y]) => [x, y, center[2] - height / 2, x, y, center[2] + height / 2]);
 }
 
 function segments(lines: number[], tone: Layer, opacity: number): LineSegments {

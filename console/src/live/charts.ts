@@ -2,6 +2,7 @@
 
 import uPlot from "uplot";
 import { byId, colour, make } from "../dom";
+import { clock } from "../units";
 
 const KEPT = 300; // points, one a second
 const SHORTEST = 60; // seconds
@@ -74,8 +75,7 @@ export class Chart {
       Math.max(now() - KEPT, Math.min(this.times[0] ?? now(), now() - SHORTEST)),
       now(),
     ];
-    const clock = (_: uPlot, ticks: number[]) =>
-      ticks.map((tick) => new Date(tick * 1e3).toLocaleTimeString("en-GB"));
+    const clocks = (_: uPlot, ticks: number[]) => ticks.map((tick) => clock(new Date(tick * 1e3)));
     const values = (_: uPlot, ticks: number[]) => ticks.map((tick) => `${+tick.toFixed(2)}${this.unit}`);
     return {
       width,
@@ -85,7 +85,7 @@ export class Chart {
       padding: [8, 8, 0, 0],
       scales: { x: { range }, y: { range: (_, __, most) => [0, (most || 1) * 1.1] } },
       axes: [
-        { ...axis, space: 80, values: clock },
+        { ...axis, space: 80, values: clocks, size: 30 },
         { ...axis, values, size: 64, space: 40 },
       ],
       series: [

@@ -7,6 +7,8 @@ const REQUESTS = "shipshape_request_seconds";
 const CONTACTS = "shipshape_contacts_total";
 const STAGES = "shipshape_stage_seconds";
 const QUEUES = "shipshape_queue_seconds";
+/** All that is read here, without the moments of creation. */
+export const READ = new RegExp(`^(${REQUESTS}|${CONTACTS}|${STAGES}|${QUEUES}|process_start_time)(?!.*_created)`);
 const RECOGNISING = new Set(["recognise", "recognise_scan", "recognise_stream", "infer"]);
 const ANSWERED = new Set(["ok", "degraded"]);
 

@@ -5,7 +5,7 @@ import { bar, byId, make, row, write } from "../dom";
 import { json, text } from "../service";
 import { digits, metres, milliseconds, percent, rate, words } from "../units";
 import { Chart } from "./charts";
-import { History, type Span, type StageSpan } from "./history";
+import { History, READ, type Span, type StageSpan } from "./history";
 import { Scrape } from "./metrics";
 
 const CHART_S = 5; // each point of a line is over so many seconds
@@ -30,7 +30,7 @@ export async function readLive(): Promise<void> {
     lane: byId<HTMLSelectElement>("promise-lane").value,
   });
   const [metrics, capacity] = await Promise.all([text("metrics"), json<Capacity>(`v1/capacity?${asked}`)]);
-  history.add(new Scrape(performance.now() / 1e3, metrics));
+  history.add(new Scrape(performance.now() / 1e3, metrics, READ));
   const recent = history.span(CHART_S);
   latency.add(Date.now() / 1e3, [recent?.p99 ?? null, recent?.p50 ?? null, capacity.budget.budget_ms]);
   traffic.add(Date.now() / 1e3, [recent?.answered ?? null, recent?.degraded ?? null, recent?.refused ?? null]);

@@ -18,14 +18,16 @@ export class Scrape {
   /**
    * @param at Seconds on any steady clock.
    * @param content In the text format of Prometheus.
+   * @param wanted Names of metrics to keep: minutes of all of them would take tens of megabytes.
    */
   constructor(
     readonly at: number,
     content: string,
+    wanted: RegExp,
   ) {
     for (const line of content.split("\n")) {
       const [, name, labels, value] = LINE.exec(line) ?? [];
-      if (name === undefined) continue;
+      if (name === undefined || !wanted.test(name)) continue;
       const held = this.samples.get(name) ?? [];
       held.push({ labels: labelsOf(labels ?? ""), value: numberOf(value ?? "") });
       this.samples.set(name, held);
@@ -35,11 +37,6 @@ export class Scrape {
   /** The sum of a metric over all label sets that `accept` takes; 0 where there is none. */
   sum(name: string, accept: (labels: Labels) => boolean = () => true): number {
     return this.of(name, accept).reduce((total, { value }) => total + value, 0);
-  }
-
-  /** Whether the service has this metric. */
-  has(name: string): boolean {
-    return this.samples.has(name);
   }
 
   /** All values that a label takes. */
