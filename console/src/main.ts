@@ -9,9 +9,11 @@ import { followTheme } from "./theme";
 import { clock } from "./units";
 
 const BEAT_MS = 1000;
+const MODEL_BEATS = 5; // from one look at which bundle runs to the next
 const VIEWS = ["live", "bench"];
 
 let model: Model | null = null;
+let beats = 0;
 let lostAt: Date | null = null;
 let waiting: ReturnType<typeof setTimeout> | undefined;
 
@@ -52,7 +54,7 @@ async function look(): Promise<void> {
   const state = await readState();
   showState(state.ready ? "good" : "warn", state.said);
   if (!state.ready && !model) return; // before the first model there is nothing to show
-  if (!model || state.ready) await readModel();
+  if (!model || (state.ready && beats++ % MODEL_BEATS === 0)) await readModel();
   if (model && view() === "live") {
     await readLive();
     showLive(model);

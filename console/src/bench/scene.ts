@@ -98,7 +98,7 @@ export class Scene3d {
       sensor: new Vector3(-this.middle[0], -this.middle[1], -this.middle[2]),
     };
     const narrow = Math.min(1, this.camera.aspect);
-    const distance = (this.radius * 1.12) / Math.sin((FOV_DEG * Math.PI) / 360) / narrow;
+    const distance = (this.radius * 0.95) / Math.sin((FOV_DEG * Math.PI) / 360) / narrow;
     this.controls.target.set(0, 0, 0);
     this.camera.position.copy(directions[from].normalize().multiplyScalar(distance));
     this.controls.update();

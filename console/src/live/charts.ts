@@ -6,6 +6,7 @@ import { clock } from "../units";
 
 const KEPT = 300; // points, one a second
 const SHORTEST = 60; // seconds
+const GAP = 5; // seconds between two points that no line joins
 const HEIGHT = 220;
 
 /** One line; `tone` is a colour of the theme, `dash` tells it from others without colour. */
@@ -43,10 +44,16 @@ export class Chart {
 
   /** A point of each line at this moment, seconds since 1970; null leaves a gap. */
   add(time: number, values: (number | null)[]): void {
+    const last = this.times.at(-1) ?? time;
+    if (time - last > GAP) this.put(last + 1, []); // nobody looked: no line across it
+    this.put(time, values);
+    this.plot?.setData(this.data());
+  }
+
+  private put(time: number, values: (number | null)[]): void {
     this.times.push(time);
     this.rows.forEach((row, index) => row.push(values[index] ?? null));
     for (const column of [this.times, ...this.rows]) if (column.length > KEPT) column.shift();
-    this.plot?.setData(this.data());
   }
 
   /** Draws it with the colours of the theme as they are now. */
