@@ -165,7 +165,7 @@ class Recognition:
     bundle: str  # digest of the model bundle
     stage_ms: Mapping[str, float] = field(default_factory=dict)
     # SPD2 images of the keypoints, 255 for 1 (see `stages.spd2`); none below rung `full`
-    descriptors: UInt8[np.ndarray, "k channels rows columns"] = field(default_factory=_none_described)
+    descriptors: UInt8[np.ndarray, "described channels rows columns"] = field(default_factory=_none_described)
 
     @property
     def measured_points(self) -> int:

@@ -5,6 +5,7 @@ import { readNpy } from "./npy";
 
 const MAX_BYTES = 64 * 2 ** 20;
 const AXES = ["x", "y", "z"];
+const BOX_SIDES = ["length", "width", "height"]; // beside x, y, z: the middles of detected boxes, not points
 
 /** A cluster file as it was read; each cluster is packed x y z, metres, level frame. */
 export interface ClusterFile {
@@ -88,6 +89,8 @@ function readText(content: ArrayBuffer, name: string): Float32Array[] {
   const header = cellsOf(first.replace(/^\s*#/, "")).map((cell) => /\w+/.exec(cell.toLowerCase())?.[0] ?? "");
   const columns = named ? AXES.map((axis) => header.indexOf(axis)) : [0, 1, 2];
   if (columns.includes(-1)) throw new Error(`expected the columns x, y, z in ${name}, got ${header.join(", ")}`);
+  if (BOX_SIDES.every((side) => header.includes(side)))
+    throw new Error(`expected points in ${name}, got a table of boxes`);
   const values = lines.slice(named ? 1 : 0).flatMap((line, index) => {
     const cells = cellsOf(line);
     const point = columns.map((column) => Number(cells[column] || Number.NaN));
@@ -138,5 +141,6 @@ function positions(parse: () => Geometry, name: string, format: string): Float32
 }
 
 function causeOf(error: unknown): string {
+  if (error instanceof TypeError) return "a damaged header"; // a library that did not look what it found
   return error instanceof Error ? error.message : String(error);
 }

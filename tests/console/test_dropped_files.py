@@ -9,6 +9,9 @@ from plyfile import PlyData, PlyElement
 from pypcd4 import PointCloud
 from pypcd4.pypcd4 import Encoding
 
+from shipshape.errors import FileError
+from shipshape.pointfiles import SUFFIXES, read_clusters
+
 with np.load(Path(__file__).parents[2] / "examples/contacts.npz") as _contacts:
     POINTS = _contacts["points"][:263]
 
@@ -111,6 +114,38 @@ def test_a_file_that_is_none_is_refused_in_one_sentence(bench, tmp_path, name):
     (tmp_path / name).write_bytes(content)
     bench.locator("#file").set_input_files(tmp_path / name)
     expect(bench.get_by_role("alert").filter(has_text=name)).to_contain_text(sentence)
+
+
+REAL = Path(__file__).parents[3] / "shared/data/lidar"
+SMALL = sorted(path for path in REAL.rglob("*") if path.suffix in SUFFIXES and path.stat().st_size < 200_000)
+
+
+@pytest.mark.skipif(not SMALL, reason="the real scans beside the checkout (../shared/data) are absent")
+def test_real_files_are_read_as_the_command_line_reads_them(bench):
+    sent = []
+    bench.on(
+        "request", lambda asked: sent.append(asked.post_data_buffer) if "v1/recognise?" in asked.url else None
+    )
+    for path in SMALL:
+        sent.clear()
+        bench.locator("#problem").evaluate("place => place.replaceChildren()")
+        bench.locator("#file").set_input_files(path)
+        if len(expected := expected_of(path)):
+            expect(bench.locator("#chosen")).to_have_text(f"{path.name}, {len(expected)} points")
+            np.testing.assert_allclose(
+                np.frombuffer(sent[0], "<f4").reshape(-1, 3), expected, rtol=1e-5, atol=1e-6
+            )
+        else:
+            expect(bench.locator("#problem")).to_contain_text(path.name)
+            assert sent == []
+
+
+def expected_of(path):
+    """The first cluster of a file as `shipshape classify` reads it; none where it refuses."""
+    try:
+        return read_clusters(path)[0]
+    except FileError:
+        return []
 
 
 def test_a_file_may_be_dropped_anywhere(bench):
