@@ -132,6 +132,38 @@ def test_a_deadline_that_cannot_be_held_is_said(bench):
     expect(bench.locator("#problem")).to_contain_text(answered.value.json()["detail"])
 
 
+def test_an_answer_of_a_lower_rung_says_what_it_lacks_and_why(bench):
+    def cheaper(route):
+        said = route.fetch().json() | {
+            "rung": "heading_and_box",
+            "rung_reason": "expected 9 ms until the deadline, got 4",
+            "keypoints": [],
+            "images": None,
+            "descriptors": None,
+            "inferred_points": 0,
+        }
+        points, measured = said["restored"]["points"], said["restored"]["measured"]
+        kept = [point for point, seen in zip(points, measured, strict=True) if seen]
+        route.fulfill(json=said | {"restored": {"points": kept, "measured": [True] * len(kept)}})
+
+    bench.route("**/v1/recognise?*", cheaper)
+    pick(bench, "RHIB")
+    for place in ("#verdict", "#images", "#descriptors"):
+        expect(bench.locator(place)).to_contain_text("heading and box: expected 9 ms until the deadline, got 4")
+    for layer in ("Inferred", "Keypoints"):
+        expect(bench.get_by_role("checkbox", name=layer)).to_be_disabled()
+
+
+def test_an_overloaded_service_says_when_to_come_back(bench):
+    document = {"detail": "expected room in the queue, got none", "error": "overloaded", "request_id": "r-7"}
+    headers = {"Shipshape-Retry-After-Ms": "1500", "Content-Type": "application/problem+json"}
+    refusal = json.dumps(document)
+    bench.route("**/v1/recognise?*", lambda route: route.fulfill(status=429, headers=headers, body=refusal))
+    bench.get_by_role("button", name=re.compile("RHIB")).click()
+    for said in (document["detail"], "overloaded", "Come back in 1.50 s", "r-7"):
+        expect(bench.locator("#problem")).to_contain_text(said)
+
+
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
 def test_the_command_that_is_shown_repeats_the_answer(bench, tmp_path):
     said = pick(bench, "Pilot boat.*64")
