@@ -59,6 +59,13 @@ def test_nothing_is_wider_than_the_screen(opened, address, view, size):
         assert page.evaluate(outside) == []
 
 
+def test_on_a_phone_the_answer_comes_into_sight(opened, address):
+    with opened(address, viewport=PHONE) as page:
+        expect(page.locator("#verdict")).not_to_be_in_viewport()
+        fill(page, "bench")
+        expect(page.locator("#verdict")).to_be_in_viewport()
+
+
 @pytest.mark.skipif(not AXE.is_file(), reason="axe-core is not installed: make console")
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 @pytest.mark.parametrize("view", VIEWS)

@@ -14,6 +14,7 @@ import { leaveSamples, showSamples } from "./samples";
 import type { Look, Scene3d } from "./scene";
 import { sentence, showClasses, showTimes, showVerdict } from "./verdict";
 
+const narrow = window.matchMedia("(max-width: 860px)"); // as in style.css
 const SLACK_MS = 10_000; // after the deadline, for an answer that is on its way
 
 let model: Model;
@@ -174,6 +175,7 @@ async function showAnswer(sent: Sent, said: Recognition, roundTripMs: number): P
   byId("results").hidden = false;
   age(false);
   showVerdict(said);
+  reveal("verdict");
   showClasses(said);
   showTimes(said, model.limits.budget_ms, roundTripMs);
   showRepeat(sent, said);
@@ -215,6 +217,11 @@ function repaint(): void {
   if (cluster && answer) drawAbove(cluster, answer);
 }
 
+/** On a narrow screen the answer lies below what was asked: moves there. */
+function reveal(id: string): void {
+  if (narrow.matches) byId(id).scrollIntoView({ block: "start" });
+}
+
 function showProblem(error: unknown): void {
   const place = byId("problem");
   const lines = [make("strong", {}, error instanceof Error ? error.message : String(error))];
@@ -225,4 +232,5 @@ function showProblem(error: unknown): void {
   }
   place.replaceChildren(...lines);
   place.hidden = false;
+  reveal("problem");
 }
