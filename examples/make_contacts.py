@@ -1,4 +1,6 @@
-"""Makes examples/contacts.npz and the package's sample cluster with the simulator; the same bytes every time.
+"""Makes examples/contacts.npz, the package's sample cluster and the console's samples with the simulator.
+
+The same bytes every time.
 
 The hulls are sisters that no model was trained on.
 
@@ -6,6 +8,7 @@ Example:
     python examples/make_contacts.py
 """
 
+import json
 import math
 from pathlib import Path
 
@@ -19,6 +22,7 @@ from shipshape_lab.simulator.vessels import build_vessel
 
 EXAMPLES = Path(__file__).parent
 SAMPLE = EXAMPLES.parent / "service" / "shipshape" / "sample_cluster.npy"
+CONSOLE = EXAMPLES.parent / "console" / "public" / "samples"
 SENSOR_HEIGHT = 3.0  # m
 SEED = 7
 
@@ -31,6 +35,13 @@ SCENE = (
     ("patrol_boat", 97.3, 5.0, 178.2),
     ("landing_craft", 71.5, 150.0, -60.9),
 )
+
+HARD = (("tug", 60.0, 15.0, 16.0), ("pilot_boat", 185.0, -40.0, 98.0))
+REMARKS = {
+    ("landing_craft", 71.5): ", in no catalogue",
+    ("tug", 60.0): ", seen from astern",
+    ("pilot_boat", 185.0): ", far away",
+}
 
 
 def main() -> None:
@@ -47,6 +58,20 @@ def main() -> None:
     )
     sample = simulate("pilot_boat", 50.0, 0.0, 60.0, rng)
     np.save(SAMPLE, thin(sample.points_level, 1000, rng))
+    write_console(scans, rng)
+
+
+def write_console(scans: list[Scan], rng: np.random.Generator) -> None:
+    """The same contacts one by one, and what is hard: end-on, and far away."""
+    hard = [(scene, simulate(*scene, rng)) for scene in HARD]
+    index = []
+    for (name, range_m, *_), scan in [*zip(SCENE, scans, strict=True), *hard]:
+        file, points = f"{name}_{range_m:.0f}m.npy", scan.points_level
+        np.save(CONSOLE / file, points)
+        title = name.replace("_", " ").capitalize().replace("Rhib", "RHIB")
+        text = f"{range_m:.0f} m, {len(points)} points{REMARKS.get((name, range_m), '')}"
+        index.append({"file": file, "title": title, "text": text, "sensor_height_m": SENSOR_HEIGHT})
+    (CONSOLE / "samples.json").write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
 
 
 def simulate(name: str, range_m: float, bearing_deg: float, heading_deg: float, rng: np.random.Generator) -> Scan:

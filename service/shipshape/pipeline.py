@@ -134,6 +134,7 @@ class Pipeline:
             image_method=work.options.image_method if work.options.preset is Preset.PAPER else None,
             bundle=self.bundle.digest,
             stage_ms=dict(stage_ms),
+            descriptors=spd2.to_grey(work.images),
         )
 
     def _is_unknown(self, work: Work) -> bool:

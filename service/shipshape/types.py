@@ -139,6 +139,10 @@ class ImagePair:
     after: UInt8[np.ndarray, "rows columns 3"]
 
 
+def _none_described() -> UInt8[np.ndarray, "0 channels rows columns"]:
+    return np.empty((0, 5, 16, 32), np.uint8)
+
+
 @dataclass(frozen=True, slots=True)
 class Recognition:
     """What Shipshape says of one contact."""
@@ -165,6 +169,8 @@ class Recognition:
     image_method: ImageMethod | None  # None: the image of preset `best`
     bundle: str  # digest of the model bundle
     stage_ms: Mapping[str, float] = field(default_factory=dict)
+    # SPD2 images of the keypoints, 255 for 1 (see `stages.spd2`); none below rung `full`
+    descriptors: UInt8[np.ndarray, "described channels rows columns"] = field(default_factory=_none_described)
 
     @property
     def measured_points(self) -> int:

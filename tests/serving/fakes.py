@@ -36,6 +36,7 @@ PATIENCE = 10.0
 DIGEST = "ab" * 32
 PNG = b"\x89PNG fake"
 SECRET = "the secret of the stage"
+DESCRIPTORS = np.random.default_rng(0).integers(0, 256, (3, 5, 16, 32), np.uint8)
 HEAD = "POST /v1/recognise HTTP/1.1\r\nHost: x\r\nContent-Type: application/octet-stream\r\nContent-Length: {}\r\n"
 HALF = HEAD.format(4800).encode() + b"\r\nabc"
 
@@ -127,6 +128,7 @@ def recognition_of(work, stage_ms):
         image_method=work.options.image_method if paper else None,
         bundle=DIGEST,
         stage_ms=stage_ms,
+        descriptors=DESCRIPTORS,
     )
 
 

@@ -17,6 +17,7 @@ from shipshape.sample import sample_contact
 from shipshape.serving.description import Description
 from shipshape.serving.grpc import convert
 from shipshape.serving.local_model import LocalModel
+from shipshape.serving.oip import results
 from shipshape.serving.order_wire import Wire, from_wire
 from shipshape.serving.rest import answers
 from shipshape.telemetry import configure_logging
@@ -24,7 +25,13 @@ from shipshape.types import Options, Preset
 from shipshape.validation import ContactLimits
 
 # Of all doors: the first request must not pay for their import.
-ENCODERS = (answers.encode, convert.encode_single, convert.encode_in_scan, convert.encode_in_stream)
+ENCODERS = (
+    answers.encode,
+    convert.encode_single,
+    convert.encode_in_scan,
+    convert.encode_in_stream,
+    results.encode,
+)
 
 
 def load_local(folder: Path, max_points: int, runtime: Runtime = PROCESSOR) -> LocalModel:

@@ -123,6 +123,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
     if wishes.images and found.images is not None:
         images = pb.ImagePair(before=_image(found.images.before), after=_image(found.images.after))
         message.images.CopyFrom(images)
+        message.descriptors.extend(map(_image, np.moveaxis(found.descriptors, 1, -1)))
     return message
 
 

@@ -7,11 +7,11 @@ from typing import Any
 from shipshape.executor import Lane, Ticket
 from shipshape.serving.clients import Share
 from shipshape.serving.core import Core, Scan, conclude, outcome_of
-from shipshape.serving.model import Answer, Model, Order, Reply, unencoded
+from shipshape.serving.model import Answer, Model, Order, Reply
 from shipshape.serving.oip.convention import count_contacts, to_contacts
 from shipshape.serving.oip.models import classes_of
 from shipshape.serving.oip.parameters import timeout_s, to_wishes
-from shipshape.serving.oip.results import RESTORED, output_specs, to_tensors
+from shipshape.serving.oip.results import RESTORED, encode, output_specs, to_tensors
 from shipshape.serving.oip.tensors import Tensor, TensorSpec
 from shipshape.telemetry import Metrics, Outcome
 from shipshape.types import Contact
@@ -95,7 +95,7 @@ def submit(
         (only,) = contacts
         if not isinstance(only, Contact):
             raise only
-        work = core.submit(model, Order(only, wishes, unencoded), deadline)
+        work = core.submit(model, Order(only, wishes, encode), deadline)
     else:
-        work = core.submit_scan(model, contacts, wishes, unencoded, deadline)
+        work = core.submit_scan(model, contacts, wishes, encode, deadline)
     return Inference(specs, ids, work, len(classes_of(model)))

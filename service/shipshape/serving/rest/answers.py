@@ -55,6 +55,7 @@ def from_answer(answer: Answer, wishes: Wishes) -> Json:
         value["restored"] = _restored(found.restored)
     if wishes.images and found.images is not None:
         value["images"] = _images(found.images)
+        value["descriptors"] = [_base64(_png(np.vstack(list(image)))) for image in found.descriptors]
     if answer.png is not None:
         value["rendered_png"] = _base64(answer.png)
     return value
@@ -131,7 +132,7 @@ def _images(images: ImagePair) -> Json:
     return {"before": _base64(_png(images.before)), "after": _base64(_png(images.after))}
 
 
-def _png(image: UInt8[np.ndarray, "rows columns 3"]) -> bytes:
+def _png(image: UInt8[np.ndarray, "rows columns *colours"]) -> bytes:
     import cv2  # noqa: PLC0415  # on the worker alone: the service itself need not hold it
 
     written, encoded = cv2.imencode(".png", image)

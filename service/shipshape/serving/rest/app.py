@@ -8,12 +8,14 @@ from typing import Any
 from fastapi import FastAPI
 from starlette.types import ASGIApp
 
+from shipshape import console
 from shipshape.serving.access import Access
 from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.health import Health
 from shipshape.serving.rest import contract
 from shipshape.serving.rest.bodies import Bodies
+from shipshape.serving.rest.console_routes import add_console
 from shipshape.serving.rest.doorkeeper import Doorkeeper
 from shipshape.serving.rest.farewell import Farewell
 from shipshape.serving.rest.front import Front
@@ -65,6 +67,7 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, 
     add("/v1/capacity", routes.capacity, "GET", **_api(CapacityAnswer, not_ready | stranger, capacity_extra))
     add_probes(app, health, metrics.registry)
     app.router.routes.extend(OipRoutes(core, metrics, timeouts, access.clients, bodies, health).routes())
+    add_console(app, console.built())
     add_handlers(app)
     contract.add_contract(app)
     front = Front(app, {RECOGNISE: routes.recognise, SCAN: routes.scan})
