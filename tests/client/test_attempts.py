@@ -1,0 +1,274 @@
+"""Retries, deadlines, choice and hedges, against services that do what the test says."""
+
+import asyncio
+import random
+import threading
+
+import grpc
+import numpy as np
+import pytest
+
+from client.scripted import PATIENCE, gone
+from shipshape.client import AsyncClient, Client, Contact, Endpoint, Lane, Wishes
+from shipshape.client.attempts import Attempts
+from shipshape.client.links import LAN, Link
+from shipshape.client.route import Route
+from shipshape.errors import (
+    DeadlineExceeded,
+    InvalidInput,
+    Overloaded,
+    ServiceFault,
+    SettingsError,
+    TooLarge,
+    Unauthenticated,
+    Unprocessable,
+    Unreachable,
+)
+
+CONTACT = Contact(np.zeros((12, 3), np.float32), "c7")
+UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "not_ready")
+CROWDED = (grpc.StatusCode.RESOURCE_EXHAUSTED, "overloaded", 30)
+
+
+@pytest.mark.parametrize("refusal", [UNAVAILABLE, (grpc.StatusCode.UNAVAILABLE,), CROWDED, CROWDED[:2]])
+def test_what_may_help_is_tried_again_at_the_only_endpoint(aboard, refusal):
+    aboard.refusals += [refusal] * 2
+    with Client(aboard.url, timeout_s=PATIENCE) as client:
+        assert client.recognise(CONTACT).vessel == "aboard"
+    assert len(aboard.asked) == 3
+    assert max(aboard.deadlines) <= PATIENCE * 1.02  # gRPC rounds them, to a hundredth
+
+
+def test_all_attempts_together_have_one_deadline():
+    given = []
+
+    async def refuse(route, left_s):
+        given.append(left_s)
+        raise Overloaded("expected room, got none", retry_after_s=0.0)
+
+    routes = [Route(name, LAN, random.Random(1)) for name in ("aboard", "shore")]
+    with pytest.raises(Overloaded):
+        asyncio.run(Attempts(routes, refuse, 0.2).run())
+    assert given[0] <= 0.2
+    assert given == sorted(given, reverse=True)
+    assert len(given) >= 4
+    assert given[-1] > 0
+
+
+@pytest.mark.parametrize(
+    ("refusal", "error"),
+    [
+        ((grpc.StatusCode.INVALID_ARGUMENT, "invalid_input"), InvalidInput),
+        ((grpc.StatusCode.INVALID_ARGUMENT, "too_large"), TooLarge),
+        ((grpc.StatusCode.INVALID_ARGUMENT, "unprocessable"), Unprocessable),
+        ((grpc.StatusCode.UNAUTHENTICATED, "unauthenticated"), Unauthenticated),
+        ((grpc.StatusCode.INTERNAL, "internal"), ServiceFault),
+        ((grpc.StatusCode.DEADLINE_EXCEEDED, "deadline_exceeded"), DeadlineExceeded),
+        ((grpc.StatusCode.RESOURCE_EXHAUSTED,), TooLarge),
+        ((grpc.StatusCode.UNIMPLEMENTED,), ServiceFault),
+    ],
+)
+def test_what_cannot_help_is_raised_at_once(aboard, shore, refusal, error):
+    aboard.refusals += [refusal]
+    with (
+        Client(aboard.url, shore.url, timeout_s=PATIENCE) as client,
+        pytest.raises(error, match=r"expected .+, got"),
+    ):
+        client.recognise(CONTACT)
+    assert (len(aboard.asked), len(shore.asked)) == (1, 0)
+
+
+def test_nothing_is_asked_after_its_deadline(aboard):
+    aboard.refusals += [(grpc.StatusCode.RESOURCE_EXHAUSTED, "overloaded", 60_000)]
+    with Client(aboard.url, timeout_s=PATIENCE) as client, pytest.raises(Overloaded) as caught:
+        client.recognise(CONTACT)
+    assert caught.value.retry_after_s == 60
+    assert len(aboard.asked) == 1
+
+
+@pytest.mark.parametrize("refusal", [UNAVAILABLE, CROWDED])
+def test_another_endpoint_is_asked_at_once(aboard, shore, refusal):
+    aboard.refusals += [refusal]
+    with Client(aboard.url, shore.url, timeout_s=PATIENCE) as client:
+        answer = client.recognise(CONTACT)
+    assert (answer.vessel, answer.endpoint) == ("shore", shore.url)
+
+
+def test_an_endpoint_that_is_gone_costs_no_answer(shore):
+    url = gone()
+    with Client(url, shore.url, timeout_s=PATIENCE) as client:
+        assert [client.recognise(CONTACT).vessel for _ in range(5)] == ["shore"] * 5
+        assert [status.resting for status in client.probe()] == [True, False]
+
+
+def test_nobody_there_is_told_in_one_sentence():
+    url = gone()
+    with Client(url, timeout_s=0.5) as client, pytest.raises(Unreachable) as caught:
+        client.recognise(CONTACT)
+    assert str(caught.value).startswith(f"expected a service at {url}, got none: is it running")
+
+
+def test_every_call_has_a_deadline_and_the_one_that_was_asked_for(aboard):
+    with Client(aboard.url, timeout_s=7.0) as client:
+        client.recognise(CONTACT)
+        client.scan([CONTACT, CONTACT], timeout_s=3.0)
+    assert 6 < aboard.deadlines[0] <= 7.1
+    assert 2 < aboard.deadlines[1] <= 3.1
+
+
+@pytest.mark.parametrize("timeout_s", [0, -1, float("nan"), 3601])
+def test_deadlines_that_cannot_be_kept(timeout_s):
+    with pytest.raises(SettingsError, match=r"expected timeout_s above 0 and up to 3600, got"):
+        Client("grpc://127.0.0.1:1", timeout_s=timeout_s)
+
+
+def test_a_silent_service_is_left_when_its_time_is_over(aboard):
+    aboard.held = threading.Event()
+    with (
+        Client(aboard.url) as client,
+        pytest.raises(DeadlineExceeded, match=r"expected an answer of grpc://.+ in time"),
+    ):
+        client.recognise(CONTACT, timeout_s=0.2)
+    assert aboard.cancelled.wait(PATIENCE)
+
+
+def test_the_preferred_endpoint_is_asked_as_long_as_it_holds_its_budget(aboard, shore):
+    aboard.computing_ms = 40.0
+    with Client(aboard.url, shore.url, timeout_s=PATIENCE) as client:
+        client.probe()
+        assert client.recognise(CONTACT).vessel == "aboard"
+        aboard.budget_ms = 30.0
+        client.probe()
+        assert client.recognise(CONTACT).vessel == "shore"
+        aboard.budget_ms = 10_000.0
+        client.probe()
+        assert client.recognise(CONTACT).vessel == "aboard"
+
+
+def test_the_load_beside_an_answer_counts_for_the_next_one(aboard, shore):
+    aboard.load, aboard.computing_ms, aboard.budget_ms = 0.0, 100.0, 5000.0
+    slow = Endpoint(aboard.url, Link(60, 5, 600, 1, 1))  # asked for its capacity once
+    with Client(slow, shore.url, timeout_s=PATIENCE) as client:
+        client.probe()
+        aboard.load = 100.0  # of which it has told nothing yet
+        assert [client.recognise(CONTACT).vessel for _ in range(3)] == ["aboard", "shore", "shore"]
+        assert client.status()[0].load == 100
+
+
+def test_a_service_that_is_not_ready_is_not_asked(aboard, shore):
+    aboard.serving = False
+    with Client(aboard.url, shore.url, timeout_s=PATIENCE) as client:
+        client.probe()
+        assert client.recognise(CONTACT).vessel == "shore"
+        assert aboard.asked == []
+
+
+async def usual(client, count=25):
+    for _ in range(count):
+        await client.recognise(CONTACT)
+
+
+def test_a_hedge_takes_the_first_answer_and_cancels_the_other_call(aboard, shore):
+    async def run():
+        async with AsyncClient(aboard.url, shore.url, timeout_s=PATIENCE, hedge=True) as client:
+            await usual(client)
+            assert shore.asked == []
+            aboard.held = threading.Event()
+            answer = await client.recognise(CONTACT)
+            assert answer.vessel == "shore"
+            assert await asyncio.to_thread(aboard.cancelled.wait, PATIENCE)
+
+    asyncio.run(run())
+
+
+def test_without_hedging_nothing_is_sent_twice(aboard, shore):
+    async def run():
+        async with AsyncClient(aboard.url, shore.url, timeout_s=PATIENCE) as client:
+            await usual(client)
+            aboard.held = threading.Event()
+            call = asyncio.create_task(client.recognise(CONTACT))
+            assert await asyncio.to_thread(aboard.entered.acquire, timeout=PATIENCE)
+            aboard.held.set()
+            assert (await call).vessel == "aboard"
+
+    asyncio.run(run())
+    assert shore.asked == []
+
+
+def test_a_hedge_that_fails_does_not_spoil_the_first_call(aboard, shore):
+    async def run():
+        async with AsyncClient(aboard.url, shore.url, timeout_s=PATIENCE, hedge=True) as client:
+            await usual(client)
+            aboard.held = threading.Event()
+            shore.refusals += [UNAVAILABLE]
+            call = asyncio.create_task(client.recognise(CONTACT))
+            while not shore.asked:
+                await asyncio.sleep(0)
+            aboard.held.set()
+            assert (await call).vessel == "aboard"
+
+    asyncio.run(run())
+
+
+def test_a_call_that_is_cancelled_is_cancelled_in_the_service(aboard):
+    async def run():
+        async with AsyncClient(aboard.url, timeout_s=PATIENCE) as client:
+            aboard.held = threading.Event()
+            call = asyncio.create_task(client.recognise(CONTACT))
+            assert await asyncio.to_thread(aboard.entered.acquire, timeout=PATIENCE)
+            call.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await call
+            assert await asyncio.to_thread(aboard.cancelled.wait, PATIENCE)
+
+    asyncio.run(run())
+
+
+def test_wishes_and_contacts_arrive(aboard):
+    contact = Contact(np.arange(36, dtype=np.float32).reshape(12, 3), "c8", 3.5, 20.0)
+    wishes = Wishes(lane=Lane.COLLISION, bundle="default", captured_at=5.0, max_age_ms=100.0, restored=True)
+    with Client(aboard.url) as client:
+        client.recognise(contact, wishes)
+    sent = aboard.asked[0]
+    assert np.array_equal(np.frombuffer(sent.contact.points, "<f4").reshape(-1, 3), contact.points_level)
+    assert (sent.contact.contact_id, sent.contact.sensor_height_m, sent.contact.own_true_heading_deg) == (
+        "c8",
+        3.5,
+        20,
+    )
+    assert str(sent.options).split() == [
+        "preset:",
+        "PRESET_BEST",
+        "image_method:",
+        "IMAGE_METHOD_FULL_SIDE",
+        "bundle:",
+        '"default"',
+        "include_restored:",
+        "true",
+        "lane:",
+        "LANE_COLLISION",
+        "lowest_rung:",
+        "RUNG_HEADING_AND_BOX",
+        "captured_at:",
+        "5",
+        "max_age_ms:",
+        "100",
+    ]
+
+
+def test_a_client_outside_its_block_says_so(aboard):
+    with pytest.raises(SettingsError, match=r"expected an open client, got one outside its `with` block"):
+        Client(aboard.url).recognise(CONTACT)
+
+
+def test_threads_share_a_client(aboard):
+    found = []
+    with Client(aboard.url, timeout_s=PATIENCE) as client:
+        threads = [
+            threading.Thread(target=lambda: found.append(client.recognise(CONTACT).vessel)) for _ in range(8)
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(PATIENCE)
+    assert found == ["aboard"] * 8
