@@ -35,11 +35,15 @@ def test_a_scale_of_ones_own_is_kept(points, scale):
     assert np.abs(dequantise(quantised).astype(np.float64) - points).max(initial=0) <= allowed
 
 
-@pytest.mark.parametrize("scale", [0.0, -1.0, math.nan, math.inf, 1e-4])
-def test_a_scale_that_cannot_hold_the_points_is_refused(scale):
+@pytest.mark.parametrize("scale", [0.0, -1.0, math.nan, math.inf])
+def test_a_scale_that_is_none_is_refused(scale):
+    with pytest.raises(InvalidInput, match=r"^expected a scale of int16 points above 0, got"):
+        quantise(np.zeros((2, 3), np.float32), scale)
+
+
+def test_a_scale_that_cannot_hold_the_points_is_made_coarser():
     points = np.array([[0, 0, 0], [100, 0, 0]], np.float32)
-    with pytest.raises(InvalidInput, match=r"^expected a scale above 0\.0015 m for these points, got"):
-        quantise(points, scale)
+    assert quantise(points, 1e-4).scale == quantise(points).scale == 50 / MOST_STEPS
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])

@@ -31,20 +31,20 @@ def quantise(points_level: Float32[np.ndarray, "n 3"], scale: float | None = Non
 
     Args:
         points_level: Metres.
-        scale: Metres a step; None: as fine as int16 allows, a third of a millimetre for 20 m. Coarser steps save
-            more bytes where a link compresses.
+        scale: Metres a step, or more where the points need it; None: as fine as int16 allows, a third of a
+            millimetre for 20 m. Coarser steps save more bytes where a link compresses.
 
     Raises:
-        InvalidInput: Points that are not finite, or farther apart than int16 counts steps of this scale.
+        InvalidInput: Points that are not finite, or a scale that is not above 0.
     """
+    if scale is not None and not 0 < scale < math.inf:
+        raise InvalidInput(f"expected a scale of int16 points above 0, got {scale:g}")
     points = points_level.astype(np.float64)
     if not np.isfinite(points).all():
         raise InvalidInput("expected finite points to quantise, got some that are not")
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
     origin, half = (low + high) / 2, float((high - low).max()) / 2
-    chosen = scale if scale is not None else half / MOST_STEPS or USUAL_SCALE
-    if not (0 < chosen < math.inf and half <= (MOST_STEPS + 0.5) * chosen):
-        raise InvalidInput(f"expected a scale above {half / MOST_STEPS:.2g} m for these points, got {chosen:g}")
+    chosen = max(half / MOST_STEPS, scale or 0.0) or USUAL_SCALE
     steps = np.clip(np.rint((points - origin) / chosen), -MOST_STEPS, MOST_STEPS)
     x, y, z = map(float, origin)
     return Quantised(steps.astype(STEP).tobytes(), (x, y, z), chosen)

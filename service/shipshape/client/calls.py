@@ -79,7 +79,7 @@ class Calls:
 
     def encode(self, contact: Contact) -> pb.Contact:
         """The message of a contact, in the form that suits the link."""
-        return from_contact(contact, int16=self.endpoint.link.int16)
+        return from_contact(contact, self.endpoint.link.step_m)
 
     async def close(self) -> None:
         """Disconnect; calls under way are cancelled."""

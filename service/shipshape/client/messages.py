@@ -22,16 +22,19 @@ from shipshape.types import (
 from shipshape.v1 import shipshape_pb2 as pb
 
 
-def from_contact(contact: Contact, *, int16: bool) -> pb.Contact:
-    """The message of a contact; points that int16 steps cannot tell go as they are, for the service to refuse."""
+def from_contact(contact: Contact, step_m: float | None = None) -> pb.Contact:
+    """The message of a contact, its points in float32, or in int16 steps of `step_m` metres.
+
+    Points that no steps can tell go as they are, for the service to refuse.
+    """
     message = pb.Contact(
         contact_id=contact.contact_id,
         sensor_height_m=contact.sensor_height,
         own_true_heading_deg=contact.own_true_heading_deg,
     )
     points = np.asarray(contact.points_level, np.float32)
-    if int16 and len(points) and np.isfinite(points).all():
-        quantised = quantise(points)
+    if step_m is not None and len(points) and np.isfinite(points).all():
+        quantised = quantise(points, step_m)
         x, y, z = quantised.origin_level
         message.points_int16, message.scale = quantised.steps, quantised.scale
         message.origin.CopyFrom(pb.Point(x=x, y=y, z=z))
