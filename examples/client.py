@@ -14,7 +14,7 @@ from shipshape.client import Client, Contact, Refusal, Wishes
 from shipshape.errors import ShipshapeError
 
 HERE = Path(__file__).parent
-PATIENCE_S = 10.0  # a program that steers by the answers sets milliseconds
+PATIENCE_S = 5.0  # a program that steers by the answers sets milliseconds
 
 
 def main() -> int:
