@@ -61,7 +61,7 @@ class GrpcDoor:
                 ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
                 ("grpc.max_receive_message_length", limits.max_body_bytes + MESSAGE_SLACK),
                 ("grpc.max_send_message_length", -1),
-                ("grpc.http2.min_recv_ping_interval_without_data_ms", PING_INTERVAL_MS),
+                ("grpc.http2.min_ping_interval_without_data_ms", PING_INTERVAL_MS),
                 ("grpc.keepalive_permit_without_calls", 1),
             ],
         )
