@@ -16,6 +16,7 @@ from shipshape.client.route import Route
 from shipshape.errors import (
     DeadlineExceeded,
     InvalidInput,
+    NotReady,
     Overloaded,
     ServiceFault,
     SettingsError,
@@ -99,6 +100,24 @@ def test_an_endpoint_that_is_gone_costs_no_answer(shore):
     with Client(url, shore.url, timeout_s=PATIENCE) as client:
         assert [client.recognise(CONTACT).vessel for _ in range(5)] == ["shore"] * 5
         assert [status.resting for status in client.probe()] == [True, False]
+
+
+def test_an_endpoint_that_rests_for_longer_than_there_is_time_is_asked_once_all_the_same(aboard):
+    aboard.refusals += [UNAVAILABLE]
+    long_rests = Link(60, 5, 600, first_backoff_s=60, longest_backoff_s=60)
+    with Client(Endpoint(aboard.url, long_rests), timeout_s=PATIENCE) as client:
+        with pytest.raises(NotReady):
+            client.recognise(CONTACT)
+        assert client.recognise(CONTACT).vessel == "aboard"
+    assert len(aboard.asked) == 2
+
+
+def test_why_nobody_can_be_asked_is_told(aboard, shore):
+    aboard.locked = shore.locked = True
+    with Client(aboard.url, shore.url, timeout_s=PATIENCE) as client:
+        assert [type(status.failure) for status in client.probe()] == [Unauthenticated] * 2
+        with pytest.raises(Unauthenticated):
+            client.recognise(CONTACT)
 
 
 def test_nobody_there_is_told_in_one_sentence():

@@ -107,6 +107,8 @@ def test_capacity_and_status_are_told_by_endpoint(doors):
     assert [*told[url_of(doors)].promises] == [Rung.FULL, Rung.HEADING_AND_BOX]
     assert isinstance(told[nobody], Unreachable)
     assert (first.resting, second.resting) == (False, True)
+    assert first.failure is None
+    assert isinstance(second.failure, Unreachable)
     assert first.round_trip_s > 0
     assert first.expected_s > first.round_trip_s
     assert second.expected_s is None

@@ -161,7 +161,14 @@ class AsyncClient:
         """What is known of each endpoint, in their order; asks nobody."""
         now = time.monotonic()
         return [
-            EndpointStatus(route.url, route.rests_until > now, route.round_trip_s, route.expected_s, route.load)
+            EndpointStatus(
+                route.url,
+                route.rests_until > now,
+                route.failure,
+                route.round_trip_s,
+                route.expected_s,
+                route.load,
+            )
             for route in self._calls
         ]
 
@@ -200,8 +207,8 @@ class AsyncClient:
     async def _probe(self, calls: Calls) -> None:
         try:
             await calls.probe(calls.endpoint.link.probe_s)
-        except ShipshapeError:
-            calls.route.told_failure(time.monotonic())
+        except ShipshapeError as error:
+            calls.route.told_failure(time.monotonic(), error)
 
     def _opened(self) -> dict[Route, Calls]:
         if not self._calls and self._local is None:

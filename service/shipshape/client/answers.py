@@ -78,6 +78,7 @@ class EndpointStatus:
 
     endpoint: str
     resting: bool  # it failed a moment ago and is left alone
+    failure: ShipshapeError | None  # why it rests, or rested last; None: it never failed
     round_trip_s: float | None  # smoothed; None: not measured yet
     expected_s: float | None  # until the answer to a contact sent now; None: not known yet
     load: float | None  # as the service reported it last

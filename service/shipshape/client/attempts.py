@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 
 from shipshape.client.failures import RETRYABLE, Silent
 from shipshape.client.route import Route, choose
-from shipshape.errors import DeadlineExceeded, Overloaded, ShipshapeError
+from shipshape.errors import DeadlineExceeded, Overloaded, ShipshapeError, Unreachable
 
 T = TypeVar("T")
 Send = Callable[[Route, float], Awaitable[T]]  # to a route, within so many seconds; raises ShipshapeError
@@ -51,7 +51,7 @@ class Attempts(Generic[T]):
             now = time.monotonic()
             if now >= self._deadline:
                 raise self._last or DeadlineExceeded("expected an answer in time, got none")
-            route = choose(self._open(now), now, self._deadline - now)
+            route = choose(self._open(now), now, self._deadline - now) or self._last_hope()
             if route is None:
                 await self._rest(now)
                 continue
@@ -63,13 +63,18 @@ class Attempts(Generic[T]):
     def _open(self, now: float) -> list[Route]:
         return [route for route in self._routes if self._not_before.get(route, 0.0) <= now]
 
+    def _last_hope(self) -> Route | None:
+        """Where all rest until it is too late, the one that rests least: its failure may be over by now."""
+        if not self._wait or self._last is not None:
+            return None
+        soonest = min(self._routes, key=lambda route: route.rests_until)
+        return soonest if soonest.rests_until >= self._deadline else None
+
     async def _rest(self, now: float) -> None:
         wakes = min(max(route.rests_until, self._not_before.get(route, 0.0)) for route in self._routes)
         if not self._wait or wakes >= self._deadline:
-            urls = ", ".join(route.url for route in self._routes)
-            raise self._last or DeadlineExceeded(
-                f"expected an endpoint that answers in time, got none: {urls} failed a moment ago"
-            )
+            failures = "; ".join(str(route.failure) for route in self._routes if route.failure)
+            raise self._last or Unreachable(f"expected an endpoint that can be asked now, got none: {failures}")
         await asyncio.sleep(wakes - now)
 
     async def _hedged(self, route: Route) -> T:
@@ -100,13 +105,13 @@ class Attempts(Generic[T]):
             rest = CROWDED_S if error.retry_after_s is None else error.retry_after_s
             self._not_before[route] = time.monotonic() + max(rest, CROWDED_S)
             raise
-        except RETRYABLE:
-            route.told_failure(time.monotonic())
+        except RETRYABLE as error:
+            route.told_failure(time.monotonic(), error)
             self._not_before[route] = route.rests_until  # whatever a probe says meanwhile
             raise
-        except Silent:
+        except Silent as error:
             now = time.monotonic()
-            route.told_silence(now, now - started)
+            route.told_silence(now, error, now - started)
             raise
         finally:
             route.outstanding -= 1

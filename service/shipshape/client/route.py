@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from shipshape.client.answers import Capacity
 from shipshape.client.links import Link
+from shipshape.errors import ShipshapeError
 
 NEWEST = 0.25  # weight of a new round trip in the smoothed one
 REMEMBERED, ENOUGH = 200, 20  # answers: of which p95 is taken, and with fewer of which there is none
@@ -27,6 +28,7 @@ class Route:
         self.link = link
         self.outstanding = 0  # calls of this client under way
         self.rests_until = 0.0  # on the caller's clock
+        self.failure: ShipshapeError | None = None  # why it rests, or rested last
         self.round_trip_s: float | None = None
         self.load: float | None = None
         self._dice = dice
@@ -54,16 +56,17 @@ class Route:
             self._told_round_trip(max(0.0, took_s - stages_s))
         self._well()
 
-    def told_failure(self, now: float) -> None:
-        """It was not there; each time in a row it is left alone for longer."""
+    def told_failure(self, now: float, why: ShipshapeError) -> None:
+        """It was not there, or of no use; each time in a row it is left alone for longer."""
+        self.failure = why
         rest = min(self.link.longest_backoff_s, self.link.first_backoff_s * 2.0**self._failures)
         self._failures = min(self._failures + 1, 32)
         self.rests_until = now + rest * self._dice.uniform(0.8, 1.2)
 
-    def told_silence(self, now: float, waited_s: float) -> None:
+    def told_silence(self, now: float, why: ShipshapeError, waited_s: float) -> None:
         """It did not answer within the deadline, which may have been too short for it."""
         if waited_s >= PATIENCE * (self.expected_s or 0.0):
-            self.told_failure(now)
+            self.told_failure(now, why)
 
     @property
     def expected_s(self) -> float | None:

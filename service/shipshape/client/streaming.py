@@ -15,7 +15,7 @@ from shipshape.client.local import Local
 from shipshape.client.messages import from_wishes, to_results
 from shipshape.client.route import choose
 from shipshape.client.wishes import Wishes
-from shipshape.errors import DeadlineExceeded, ShipshapeError
+from shipshape.errors import DeadlineExceeded, ShipshapeError, Unreachable
 from shipshape.types import Contact
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -111,7 +111,7 @@ class Streaming:
                 if writing.done():
                     writing.result()  # raises what a contact was wrong with
                 if late := self._late(GRACE_S):
-                    calls.route.told_silence(time.monotonic(), self._timeout_s)
+                    calls.route.told_silence(time.monotonic(), _silence(calls.endpoint.url), self._timeout_s)
                     for scan in late:
                         yield self._finish(scan, _late(scan, calls.endpoint.url))
                     return
@@ -123,16 +123,16 @@ class Streaming:
                 if (answered := self._waiting.get(response.sequence)) is not None:
                     yield self._finish(answered, _answer(response, calls.endpoint.url))
         except aio.AioRpcError as error:
-            await self._explain(error, calls)
-            calls.route.told_failure(time.monotonic())
+            failure = await self._explain(error, calls)
+            calls.route.told_failure(time.monotonic(), failure)
         finally:
             for task in (writing, reading):
                 task.cancel()
             call.cancel()
             await asyncio.gather(writing, reading, return_exceptions=True)
 
-    async def _explain(self, error: aio.AioRpcError, calls: Calls) -> None:
-        """Raise what ended a call, unless another call may go on."""
+    async def _explain(self, error: aio.AioRpcError, calls: Calls) -> ShipshapeError:
+        """What ended a call; raised unless another call may go on."""
         failure = error_of(error, calls.endpoint.url)
         if error.details() == LOST_STATUS:
             try:
@@ -140,9 +140,10 @@ class Streaming:
             except ShipshapeError as plain:
                 failure = plain
             else:
-                return
+                return Unreachable(f"expected a stream of {calls.endpoint.url} that holds, got one that broke")
         if not isinstance(failure, (*RETRYABLE, DeadlineExceeded)):
             raise failure from error
+        return failure
 
     async def _write(self, call: Any, calls: Calls) -> None:
         try:
@@ -180,8 +181,11 @@ class Streaming:
 
 
 def _late(scan: _Scan, where: str) -> ScanAnswer:
-    error: ShipshapeError = Silent(f"expected an answer of {where} in time, got none")
-    return ScanAnswer(scan.sequence, (), error)
+    return ScanAnswer(scan.sequence, (), _silence(where))
+
+
+def _silence(where: str) -> Silent:
+    return Silent(f"expected an answer of {where} in time, got none")
 
 
 def _answer(response: pb.RecogniseStreamResponse, endpoint: str) -> ScanAnswer:
