@@ -34,7 +34,16 @@ INSTEAD = {
 EXPLANATION = ("method.md", "results.md")
 FIRST = "tutorial.md"
 STYLE = Path(__file__).with_name("site.css")
-LANGUAGES = {".py": "python", ".proto": "proto", ".json": "json", ".sh": "sh", ".js": "js", ".toml": "toml"}
+LANGUAGES = {
+    ".py": "python",
+    ".proto": "proto",
+    ".json": "json",
+    ".sh": "sh",
+    ".js": "js",
+    ".toml": "toml",
+    ".yaml": "yaml",
+    ".yml": "yaml",
+}
 
 
 def on_config(config: Any) -> Any:
@@ -78,7 +87,7 @@ def _place(target: str) -> str | None:
         return OUTSIDE.get(target) or INSTEAD[target]
     if target.startswith("docs/"):
         return target.removeprefix("docs/")
-    return f"source/{target}.md" if (ROOT / target).is_file() else None
+    return f"source/{target}.md" if (ROOT / target).exists() else None
 
 
 def _linked_sources() -> set[str]:
@@ -97,6 +106,10 @@ def _linked_sources() -> set[str]:
 
 
 def _listing(path: Path) -> str:
-    """A source file as a page."""
+    """A source file as a page, or the names of a folder's files."""
     title, language = path.relative_to(ROOT).as_posix(), LANGUAGES.get(path.suffix, "text")
-    return f"# {title}\n\n`````{language}\n{path.read_text(encoding='utf-8')}\n`````\n"
+    if path.is_dir():
+        text = "\n".join(sorted(each.name for each in path.iterdir() if not each.name.startswith((".", "__"))))
+    else:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    return f"# {title}\n\n`````{language}\n{text}\n`````\n"
