@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -59,7 +60,10 @@ def commands() -> str:
 def rest() -> str:
     """The REST contract."""
     contract = json.loads(CONTRACT.read_text(encoding="utf-8"))
-    return f"# REST\n\n{OpenAPIV3DocumentationHandler(contract, style='MARKDOWN', source=str(CONTRACT)).write()}"
+    written = OpenAPIV3DocumentationHandler(contract, style="MARKDOWN", source=str(CONTRACT)).write()
+    _, _, below = written.partition("\n# ")  # a notice of its maker, then a title
+    below = re.sub(r"^### Response", "#### Response", below.partition("\n")[2], flags=re.M)  # under its path
+    return f"# REST\n{below}"
 
 
 def client() -> str:

@@ -50,7 +50,7 @@ def unpacked(wheel):
 def test_the_wheel_holds_the_service_alone(unpacked):
     assert {path.name.partition("-")[0] for path in unpacked.iterdir()} == {"shipshape"}
     kinds = {path.suffix for path in (unpacked / "shipshape").rglob("*") if path.is_file()}
-    assert kinds == {".py", ".pyi", ".npy", ".md", ".html"}
+    assert kinds == {".py", ".pyi", ".npy", ".md", ".html", ".typed"}
 
 
 def test_the_wheel_asks_for_nothing_of_the_lab(unpacked):
