@@ -3,12 +3,14 @@
 import asyncio
 import random
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import grpc
 import numpy as np
 import pytest
 
-from client.scripted import PATIENCE, gone
+from client.scripted import PATIENCE, Scripted, gone, serving
+from serving.fakes import until
 from shipshape.client import AsyncClient, Client, Contact, Endpoint, Lane, Wishes
 from shipshape.client.attempts import Attempts
 from shipshape.client.links import LAN, Link
@@ -291,3 +293,27 @@ def test_threads_share_a_client(aboard):
         for thread in threads:
             thread.join(PATIENCE)
     assert found == ["aboard"] * 8
+
+
+def test_a_service_that_comes_and_goes_costs_no_answer(shore):
+    """Stopped in the middle of calls, again and again, while eight threads ask."""
+    service, found, over = Scripted("aboard"), [], threading.Event()
+
+    def ask(client):
+        while not over.is_set():
+            found.append(client.recognise(CONTACT).vessel)
+
+    with serving(service):
+        port = int(service.url.rpartition(":")[2])
+    with Client(service.url, shore.url, timeout_s=PATIENCE) as client, ThreadPoolExecutor(8) as threads:
+        asking = [threads.submit(ask, client) for _ in range(8)]
+        try:
+            for _ in range(6):
+                before = len(service.asked)
+                with serving(service, port):
+                    until(lambda before=before: len(service.asked) > before + 20 or any(a.done() for a in asking))
+        finally:
+            over.set()
+        for each in asking:
+            each.result(PATIENCE)
+    assert {"aboard", "shore"} == set(found)

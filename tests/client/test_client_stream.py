@@ -1,13 +1,16 @@
 """Streams: every scan gets one answer, whatever the connection does."""
 
 import asyncio
+import itertools
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import grpc
 import numpy as np
 import pytest
 
 from client.scripted import PATIENCE, Scripted, gone, serving
+from serving.fakes import until
 from shipshape.client import AsyncClient, Client, Contact
 from shipshape.errors import DeadlineExceeded, InvalidInput, Unauthenticated
 
@@ -155,3 +158,36 @@ def test_an_error_of_a_message_does_not_end_the_stream(doors):
     assert isinstance(answers[1].error, InvalidInput)
     assert answers[2].results[1].contact_id == "few"
     assert str(answers[2].results[1].error) == "expected at least 10 points in a cluster, got 3"
+
+
+def test_a_stream_outlives_services_that_come_and_go():
+    """Stopped in the middle of it, again and again: every scan is answered, once, and none with an error."""
+    service, found = Scripted("aboard"), []
+    with serving(service):
+        port = int(service.url.rpartition(":")[2])
+    over = threading.Event()
+
+    def source():
+        for number in itertools.count():
+            if over.is_set():
+                return
+            yield [Contact(POINTS, str(number))]
+
+    def read(client):
+        found.extend(client.stream(source()))
+
+    with Client(service.url, timeout_s=PATIENCE) as client, ThreadPoolExecutor(1) as thread:
+        reading = thread.submit(read, client)
+        try:
+            for _ in range(5):
+                before = len(service.asked)
+                with serving(service, port):
+                    until(lambda before=before: len(service.asked) > before + 50 or reading.done())
+            with serving(service, port):
+                over.set()
+                reading.result(PATIENCE)
+        finally:
+            over.set()
+    assert sorted(answer.sequence for answer in found) == list(range(len(found)))
+    assert {answer.error for answer in found} == {None}
+    assert len(service.asked) >= len(found) > 100

@@ -35,7 +35,7 @@ STATUS: dict[grpc.StatusCode, type[ShipshapeError]] = {
     grpc.StatusCode.UNAVAILABLE: Unreachable,
     grpc.StatusCode.DEADLINE_EXCEEDED: DeadlineExceeded,
     grpc.StatusCode.RESOURCE_EXHAUSTED: TooLarge,
-    grpc.StatusCode.CANCELLED: Cancelled,
+    grpc.StatusCode.CANCELLED: Unreachable,  # by the service that stops: what the caller cancels has no status
     grpc.StatusCode.UNAUTHENTICATED: Unauthenticated,
 }
 # A recognition changes nothing in the service: to ask again is always safe, and after these it may help.
