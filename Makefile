@@ -9,7 +9,7 @@ EDITABLE := $(PIP) install --no-build-isolation --no-deps --no-index
 CONSOLE := service/shipshape/console/static/index.html
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve setup test check fmt lint types arch gen gen-check train torch clients console lock hooks \
+.PHONY: help demo serve setup test check fmt lint types arch gen gen-check docs train torch clients console lock hooks \
   image
 
 help: ## list these commands
@@ -50,6 +50,9 @@ gen-check: $(VENV)/.dev ## the gRPC stubs are those of proto/
 	for stub in "$$fresh"/shipshape/*/*; do \
 	  diff "$$stub" "service/$${stub#"$$fresh"/}" || { echo "make gen-check: expected the stubs of proto/, got others: run make gen" >&2; exit 1; }; \
 	done
+
+docs: $(VENV)/.dev ## build the documentation as a site in out/site; open its index.html
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 train: torch ## make the default bundle in the lab: data sets, networks, ONNX, manifest
 	@$(BIN)/shipshape-lab train --work runs --to models

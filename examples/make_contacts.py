@@ -1,4 +1,4 @@
-"""Makes examples/contacts.npz, the package's sample cluster and the console's samples with the simulator.
+"""Makes contacts.npz, contact.pcd, the package's sample cluster and the console's samples with the simulator.
 
 The same bytes every time.
 
@@ -13,6 +13,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from pypcd4 import Encoding, PointCloud
 
 from shipshape_lab.simulator import recipes
 from shipshape_lab.simulator.scan import Conditions, Scan, scan_vessel
@@ -25,6 +26,7 @@ SAMPLE = EXAMPLES.parent / "service" / "shipshape" / "sample_cluster.npy"
 CONSOLE = EXAMPLES.parent / "console" / "public" / "samples"
 SENSOR_HEIGHT = 3.0  # m
 SEED = 7
+PCD = 1  # of the scene, in contact.pcd
 
 # vessel, range in m, bearing and heading in degrees; the last one is in nobody's catalogue
 SCENE = (
@@ -45,7 +47,7 @@ REMARKS = {
 
 
 def main() -> None:
-    """Write both files."""
+    """Write the files."""
     rng = np.random.default_rng(SEED)
     scans = [simulate(*contact, rng) for contact in SCENE]
     np.savez_compressed(
@@ -56,6 +58,8 @@ def main() -> None:
         heading=np.array([scan.heading for scan in scans]),
         sensor_height=np.float64(SENSOR_HEIGHT),
     )
+    one = PointCloud.from_xyz_points(scans[PCD].points_level)
+    one.save(EXAMPLES / "contact.pcd", encoding=Encoding.BINARY)
     sample = simulate("pilot_boat", 50.0, 0.0, 60.0, rng)
     np.save(SAMPLE, thin(sample.points_level, 1000, rng))
     write_console(scans, rng)

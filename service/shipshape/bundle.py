@@ -225,7 +225,8 @@ class _ManifestSpec(_Spec):
 def _read_manifest(folder: Path) -> bytes:
     if not folder.is_dir():
         raise BundleError(
-            f"expected a bundle folder at {folder}, got {'a file' if folder.exists() else 'nothing'}"
+            f"expected a bundle folder at {folder}, got {'a file' if folder.exists() else 'nothing'}: "
+            "--bundle or SHIPSHAPE_BUNDLE names another"
         )
     try:
         return (folder / MANIFEST).read_bytes()

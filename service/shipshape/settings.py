@@ -1,5 +1,6 @@
 """Environment -> frozen settings; every one has a default that works, and a wrong one stops the start."""
 
+import difflib
 import os
 from enum import StrEnum
 from pathlib import Path
@@ -238,7 +239,9 @@ def load_settings(**overrides: Any) -> Settings:
     known = {f"{PREFIX}{name}".upper() for name in Settings.model_fields}
     unknown = sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)
     if unknown:
-        raise SettingsError(f"expected only known {PREFIX}* variables, got {', '.join(unknown)}")
+        near = difflib.get_close_matches(unknown[0].upper(), known, 1)
+        meant = f": did you mean {near[0]}?" if near else ""
+        raise SettingsError(f"expected only known {PREFIX}* variables, got {', '.join(unknown)}{meant}")
     try:
         return Settings(**overrides)
     except ValidationError as error:

@@ -52,7 +52,7 @@ def test_the_wheel_holds_the_service_alone(unpacked):
     assert {path.name.partition("-")[0] for path in unpacked.iterdir()} == {"shipshape"}
     kinds = {path.suffix for path in (unpacked / "shipshape").rglob("*") if path.is_file()}
     console = {".css", ".js", ".json", ".svg", ".txt"} if built() else set()
-    assert kinds == {".py", ".pyi", ".npy", ".md", ".html"} | console
+    assert kinds == {".py", ".pyi", ".npy", ".md", ".html", ".typed"} | console
 
 
 def test_the_wheel_asks_for_nothing_of_the_lab(unpacked):

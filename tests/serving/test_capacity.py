@@ -125,6 +125,9 @@ def test_every_answer_carries_the_load(doors):
     Servicer(core, metrics, Timeouts(), doors.service._grpc._streams).Recognise(request(POINTS), context)
     report = orca().FromString(context.trailing["endpoint-load-metrics-bin"])
     assert 0.0 <= report.application_utilization <= 1.0
+    assert float(context.trailing["shipshape-load"]) == pytest.approx(report.application_utilization, abs=1e-3)
+    _, call = doors.ask_grpc(POINTS)
+    assert 0.0 <= float(dict(call.trailing_metadata())["shipshape-load"]) <= 1.0
 
 
 def test_the_load_is_the_message_that_balancers_know():

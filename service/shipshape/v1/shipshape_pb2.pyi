@@ -90,16 +90,22 @@ ERROR_KIND_INTERNAL: ErrorKind
 ERROR_KIND_UNAUTHENTICATED: ErrorKind
 
 class Contact(_message.Message):
-    __slots__ = ("contact_id", "points", "sensor_height_m", "own_true_heading_deg")
+    __slots__ = ("contact_id", "points", "sensor_height_m", "own_true_heading_deg", "points_int16", "origin", "scale")
     CONTACT_ID_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     SENSOR_HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
     OWN_TRUE_HEADING_DEG_FIELD_NUMBER: _ClassVar[int]
+    POINTS_INT16_FIELD_NUMBER: _ClassVar[int]
+    ORIGIN_FIELD_NUMBER: _ClassVar[int]
+    SCALE_FIELD_NUMBER: _ClassVar[int]
     contact_id: str
     points: bytes
     sensor_height_m: float
     own_true_heading_deg: float
-    def __init__(self, contact_id: _Optional[str] = ..., points: _Optional[bytes] = ..., sensor_height_m: _Optional[float] = ..., own_true_heading_deg: _Optional[float] = ...) -> None: ...
+    points_int16: bytes
+    origin: Point
+    scale: float
+    def __init__(self, contact_id: _Optional[str] = ..., points: _Optional[bytes] = ..., sensor_height_m: _Optional[float] = ..., own_true_heading_deg: _Optional[float] = ..., points_int16: _Optional[bytes] = ..., origin: _Optional[_Union[Point, _Mapping]] = ..., scale: _Optional[float] = ...) -> None: ...
 
 class Options(_message.Message):
     __slots__ = ("preset", "image_method", "bundle", "include_restored", "include_images", "include_png", "lane", "lowest_rung", "captured_at", "max_age_ms")

@@ -5,7 +5,7 @@ from enum import StrEnum
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float32, UInt8
 
 from shipshape.budget import Report
 from shipshape.errors import InvalidInput
@@ -20,6 +20,7 @@ from shipshape.serving.encoding import (
     pack,
     points_from_bytes,
 )
+from shipshape.serving.encoding_int16 import points_from_int16
 from shipshape.serving.faults import Fault, FaultKind
 from shipshape.serving.model import Answer, Model, Reply
 from shipshape.types import Box, Contact, ImageMethod, Options, Preset, Reason, RestoredCloud, Rung
@@ -49,7 +50,7 @@ _IMAGE_METHOD_NUMBERS = {method: number for number, method in IMAGE_METHODS.item
 def to_contact(message: pb.Contact, limits: Limits) -> Contact:
     """The contact of a message; raises InvalidInput for what `encoding` refuses."""
     return make_contact(
-        points_from_bytes(message.points, limits),
+        _points(message, limits),
         contact_id=message.contact_id,
         sensor_height_m=message.sensor_height_m if message.HasField("sensor_height_m") else None,
         own_true_heading_deg=message.own_true_heading_deg if message.HasField("own_true_heading_deg") else None,
@@ -214,6 +215,15 @@ def from_capacity(capacity: Capacity, budget: Report) -> pb.GetCapacityResponse:
 def to_lane(number: int) -> Lane:
     """The lane of its number; raises InvalidInput for one that the contract does not know."""
     return _numbered(LANES, number, "lane", Lane.TRACKING)
+
+
+def _points(message: pb.Contact, limits: Limits) -> Float32[np.ndarray, "n 3"]:
+    if not message.points_int16:
+        return points_from_bytes(message.points, limits)
+    if message.points:
+        raise InvalidInput("expected one of points and points_int16, got both")
+    origin = message.origin
+    return points_from_int16(message.points_int16, (origin.x, origin.y, origin.z), message.scale, limits)
 
 
 def _box(box: Box) -> pb.Box:

@@ -25,6 +25,9 @@ from shipshape.v1 import shipshape_pb2_grpc
 SERVICES = (V1.service, GUARDED.service)
 LIVE = "live"  # the name under which grpc.health.v1 tells whether the process is worth keeping
 SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and for reflection streams
+PING_INTERVAL_MS = (
+    20_000  # that clients may ping at when idle; gRPC's own five minutes outlast what modems remember
+)
 MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that the refusal is ours, in one sentence
 
 
@@ -58,6 +61,8 @@ class GrpcDoor:
                 ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
                 ("grpc.max_receive_message_length", limits.max_body_bytes + MESSAGE_SLACK),
                 ("grpc.max_send_message_length", -1),
+                ("grpc.http2.min_ping_interval_without_data_ms", PING_INTERVAL_MS),
+                ("grpc.keepalive_permit_without_calls", 1),
             ],
         )
         self._streams = Streams(core, metrics, timeouts, access)

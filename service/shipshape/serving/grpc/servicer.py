@@ -12,7 +12,7 @@ from shipshape.serving.encoding import check_contacts
 from shipshape.serving.grpc import convert
 from shipshape.serving.grpc.guard import current_call, set_trailing
 from shipshape.serving.grpc.streams import STREAMS, Streams
-from shipshape.serving.load_report import GRPC_TRAILER, as_message
+from shipshape.serving.load_report import GRPC_TRAILER, PLAIN_TRAILER, as_message
 from shipshape.serving.model import Order
 from shipshape.serving.timing import LONGEST_MS, Timeouts, server_timing
 from shipshape.telemetry import Metrics
@@ -113,4 +113,5 @@ def cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -
 def set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float], load: float) -> None:
     """Trailing metadata: the milliseconds of each stage, the load and the request's id."""
     current_call.get().outcome.computed(stage_ms)
-    set_trailing(context, ("server-timing", server_timing(stage_ms)), (GRPC_TRAILER, as_message(load)))
+    loads = ((GRPC_TRAILER, as_message(load)), (PLAIN_TRAILER, f"{load:.3f}"))
+    set_trailing(context, ("server-timing", server_timing(stage_ms)), *loads)
