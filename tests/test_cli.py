@@ -13,7 +13,7 @@ import pytest
 from builders_onnx import write_tiny_bundle
 from builders_pipeline import FakePipeline, fake_bundle
 from builders_recognition import side_of_hull, write_scan
-from shipshape import commands
+from shipshape import commands, serve
 from shipshape.cli import build_parser, main
 from shipshape.pointfiles import SUFFIXES
 from shipshape.sample import sample_contact
@@ -229,13 +229,13 @@ def test_a_missing_bundle_exits_with_2_and_one_sentence(command, tmp_path, capsy
 
 def test_serve_hands_its_options_to_the_service(monkeypatch, tmp_path):
     seen = []
-    monkeypatch.setattr(commands, "serve_until_signal", lambda settings: seen.append(settings) or 0)
+    monkeypatch.setattr(serve, "serve_until_signal", lambda settings: seen.append(settings) or 0)
     assert main(["serve", "--rest-port", "0", "--grpc-port", "0", "--bundle", str(tmp_path)]) == 0
     assert (seen[0].rest_port, seen[0].grpc_port, seen[0].bundle) == (0, 0, tmp_path)
 
 
 def test_a_setting_that_cannot_work_exits_with_2(monkeypatch, capsys):
-    monkeypatch.setattr(commands, "serve_until_signal", lambda settings: 0)
+    monkeypatch.setattr(serve, "serve_until_signal", lambda settings: 0)
     assert main(["serve", "--rest-port", "99999"]) == 2
     assert "SHIPSHAPE_REST_PORT, got 99999" in capsys.readouterr().err
 

@@ -2,7 +2,6 @@
 
 import difflib
 import os
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,7 +10,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from shipshape.errors import SettingsError
 
-__all__ = ["PREFIX", "Compute", "Settings", "SettingsError", "default_bundle", "load_settings"]
+__all__ = ["PREFIX", "Settings", "SettingsError", "default_bundle", "load_settings"]
 
 PREFIX = "SHIPSHAPE_"
 
@@ -20,13 +19,6 @@ def default_bundle() -> Path:
     """`models` in the current directory, else that of the source checkout this package runs from."""
     here, checkout = Path("models"), Path(__file__).resolve().parents[2] / "models"
     return checkout if not here.is_dir() and checkout.is_dir() else here
-
-
-class Compute(StrEnum):
-    """Where contacts are computed."""
-
-    PROCESSES = "processes"
-    THREADS = "threads"
 
 
 class Settings(BaseSettings):
@@ -40,6 +32,11 @@ class Settings(BaseSettings):
     )
     rest_port: int = Field(8080, ge=0, le=65535, description="TCP port of the REST door; 0 picks a free one.")
     grpc_port: int = Field(50051, ge=0, le=65535, description="TCP port of the gRPC door; 0 picks a free one.")
+    share_ports: bool = Field(
+        False,
+        description="Lets several services listen on the same ports (SO_REUSEPORT); the system spreads "
+        "connections among them. One service is the rule: queue, lanes and limits of clients are each one's own.",
+    )
     bundle: Path = Field(
         default_factory=default_bundle,
         description="Folder of the model bundle. Default: ./models, else the models of the source checkout.",
@@ -51,8 +48,8 @@ class Settings(BaseSettings):
         description="What computes, processes or threads: 0 is one a usable core, with a GPU as many threads as "
         "fill two of its runs. More of them share the same cores: higher latency, no more throughput.",
     )
-    compute: Compute = Field(
-        Compute.PROCESSES,
+    compute: Literal["processes", "threads"] = Field(
+        "processes",
         description="Where contacts are computed: in `processes` forked from one that holds the bundle, each with "
         "an interpreter for itself, or in `threads` of the service, which share one: less memory, slower. With a "
         "GPU always in threads.",

@@ -34,8 +34,8 @@ class Hand(ABC):
         """Nobody wants this entry any more; it ends at the next stage boundary."""
 
     @abstractmethod
-    def has_room(self, lane: Lane) -> bool:
-        """Whether an entry of this lane would be begun at once, or soon enough."""
+    def room(self, lane: Lane) -> int | None:
+        """How many entries go before a new one of this lane; None when that would take too long."""
 
     @abstractmethod
     def is_stuck(self, now: float) -> bool:
@@ -49,10 +49,6 @@ class Hand(ABC):
     def seconds(self, lane: Lane, now: float) -> float:
         """That its work will probably take which goes before new work of this lane."""
         return sum(entry.left for entry in self.given.values() if entry.task.lane in UP_TO[lane])
-
-    def ahead(self, lane: Lane) -> int:
-        """How many entries it has that go before new ones of this lane."""
-        return sum(entry.task.lane in UP_TO[lane] for entry in self.given.values())
 
 
 class Crew(ABC):
@@ -99,9 +95,9 @@ class ThreadHand(Hand):
     def take_back(self, entry: Entry) -> None:
         """Its ticket, which the worker looks at, says so already."""
 
-    def has_room(self, lane: Lane) -> bool:
-        """Whether its worker would begin at the next stage boundary."""
-        return not self.ahead(lane)
+    def room(self, lane: Lane) -> int | None:
+        """0 when its worker would begin at the next stage boundary."""
+        return None if any(entry.task.lane in UP_TO[lane] for entry in self.given.values()) else 0
 
     def is_stuck(self, now: float) -> bool:
         """Whether a stage takes longer than `WEDGED_S`."""

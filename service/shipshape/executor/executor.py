@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 from shipshape.errors import NotReady, Overloaded
@@ -245,10 +246,10 @@ class Executor:
         while (first := self._queues.first()) is not None:
             lane, entry = first
             crew = entry.task.crew or self._thread_crew()
-            free = [hand for hand in crew.hands if hand.has_room(lane)]
-            if not free:
+            rooms = [(room, len(hand.given), hand) for hand in crew.hands if (room := hand.room(lane)) is not None]
+            if not rooms:
                 return
-            hand = min(free, key=lambda hand: (hand.ahead(lane), len(hand.given)))
+            *_, hand = min(rooms, key=itemgetter(0, 1))
             self._queues.remove(lane, entry)
             entry.hand = hand
             hand.give(entry)

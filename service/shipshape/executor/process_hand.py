@@ -45,12 +45,14 @@ class ProcessHand(Hand):
         """Nobody wants this entry any more."""
         self._send(packed((id(entry),)))
 
-    def has_room(self, lane: Lane) -> bool:
-        """Whether it is free for this lane, or will be so soon that the entry had better be there by then."""
+    def room(self, lane: Lane) -> int | None:
+        """How many go before; None where it will not be free so soon that one more had better be there by then."""
         if not self.alive:
-            return False
+            return None
         ahead = [entry.left for entry in self.given.values() if entry.task.lane in UP_TO[lane]]
-        return not ahead or (len(ahead) < MOST and sum(ahead) <= SOON_S)
+        if ahead and (len(ahead) >= MOST or sum(ahead) > SOON_S):
+            return None
+        return len(ahead)
 
     def is_stuck(self, now: float) -> bool:
         """Whether it has work and has said nothing for `WEDGED_S`."""

@@ -3,7 +3,7 @@
 from shipshape.executor import usable_cores
 from shipshape.micro_batches import BUCKETS
 from shipshape.providers import Provider, Runtime, find_provider
-from shipshape.settings import Compute, Settings
+from shipshape.settings import Settings
 
 
 def runtime_of(settings: Settings) -> Runtime:
@@ -27,4 +27,4 @@ def workers_of(settings: Settings, provider: Provider) -> int:
 
 def in_processes(settings: Settings, provider: Provider) -> bool:
     """Whether contacts are computed in worker processes: a GPU wants all of them in one."""
-    return settings.compute is Compute.PROCESSES and provider is Provider.CPU
+    return settings.compute == "processes" and provider is Provider.CPU

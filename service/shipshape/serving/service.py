@@ -81,10 +81,16 @@ class Service:
         self.models = Models(load, self._try_out, self._publish)
         access = load_access(settings, metrics.count_client_refusal)
         self._grpc = GrpcDoor(
-            self._core, metrics, timeouts, access, self.health, waiting=settings.queue_limit + workers
+            self._core,
+            metrics,
+            timeouts,
+            access,
+            self.health,
+            waiting=settings.queue_limit + workers,
+            shared=settings.share_ports,
         )
         app = build_app(self._core, metrics, timeouts, access, self.health)
-        self._rest = RestDoor(app, access.tls, on_death=on_death)
+        self._rest = RestDoor(app, access.tls, on_death=on_death, shared=settings.share_ports)
         root = settings.bundle_root or settings.bundle.absolute().parent
         self._operators = OperatorDoors(
             settings,

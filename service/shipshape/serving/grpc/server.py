@@ -43,10 +43,19 @@ class GrpcDoor:
         waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
             executor's queue, which is bounded and refuses, is where they wait; streams of contacts and of
             reflection, which hold a thread each as well, are bounded for the same reason.
+        shared: Other processes may listen on the same port; the system spreads connections among them.
     """
 
     def __init__(
-        self, core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, health: Health, *, waiting: int
+        self,
+        core: Core,
+        metrics: Metrics,
+        timeouts: Timeouts,
+        access: Access,
+        health: Health,
+        *,
+        waiting: int,
+        shared: bool,
     ) -> None:
         limits = core.limits
         self._tls = access.tls
@@ -58,7 +67,7 @@ class GrpcDoor:
                 *(Guard(guarded, metrics, limits, access) for guarded in (V1, GUARDED)),
             ],
             options=[
-                ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
+                ("grpc.so_reuseport", int(shared)),  # unasked, a second service on the same port must fail
                 ("grpc.max_receive_message_length", limits.max_body_bytes + MESSAGE_SLACK),
                 ("grpc.max_send_message_length", -1),
                 ("grpc.http2.min_ping_interval_without_data_ms", PING_INTERVAL_MS),
