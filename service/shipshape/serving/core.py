@@ -102,6 +102,11 @@ class Core:
         """Whether requests are taken, and computed: no worker is dead or stuck."""
         return self._model is not None and self._executor.sound
 
+    @property
+    def places(self) -> int:
+        """Contacts that may wait or be computed at a time."""
+        return self._executor.queue_limit + self._executor.workers
+
     def open(self, model: Model) -> None:
         """Take requests from now on, answered by `model`."""
         self._model = model

@@ -86,7 +86,6 @@ class Service:
             timeouts,
             access,
             self.health,
-            waiting=settings.queue_limit + workers,
             shared=settings.share_ports,
         )
         app = build_app(self._core, metrics, timeouts, access, self.health)

@@ -24,6 +24,8 @@ from shipshape.v1 import shipshape_pb2_grpc
 
 SERVICES = (V1.service, GUARDED.service)
 LIVE = "live"  # the name under which grpc.health.v1 tells whether the process is worth keeping
+# Beside them, each contact that waits or is computed may hold a thread, so that the executor's queue, which is bounded
+# and refuses, is where contacts wait; streams of contacts and of reflection are bounded for the same reason.
 SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and for reflection streams
 PING_INTERVAL_MS = (
     20_000  # that clients may ping at when idle; gRPC's own five minutes outlast what modems remember
@@ -40,9 +42,6 @@ class GrpcDoor:
         timeouts: Deadline of callers that set none.
         access: Who may come in.
         health: Whether requests should be sent here.
-        waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
-            executor's queue, which is bounded and refuses, is where they wait; streams of contacts and of
-            reflection, which hold a thread each as well, are bounded for the same reason.
         shared: Other processes may listen on the same port; the system spreads connections among them.
     """
 
@@ -54,14 +53,13 @@ class GrpcDoor:
         access: Access,
         health: Health,
         *,
-        waiting: int,
         shared: bool,
     ) -> None:
         limits = core.limits
         self._tls = access.tls
         self._health = WatchedHealth()
         self._server = grpc.server(
-            ThreadPoolExecutor(waiting + SPARE_THREADS + STREAMS, thread_name_prefix="grpc"),
+            ThreadPoolExecutor(core.places + SPARE_THREADS + STREAMS, thread_name_prefix="grpc"),
             interceptors=[
                 Doorkeeper(access),
                 *(Guard(guarded, metrics, limits, access) for guarded in (V1, GUARDED)),
