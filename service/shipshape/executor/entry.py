@@ -98,11 +98,6 @@ class Entry:
         self.timed.append((stage, seconds))
         self.left -= self._ahead.pop(0) if self._ahead else 0.0
 
-    @property
-    def seconds(self) -> float:
-        """That its stages and `finish` took."""
-        return sum(seconds for _, seconds in self.timed)
-
     def ended(self) -> Ended:
         """How it was computed, once every stage has run."""
         return Ended(self.rung.name, self._why, self.stage_ms)

@@ -69,7 +69,7 @@ class Report(NamedTuple):
     place: int = 0  # of the rung that it was computed on
     stage_ms: Mapping[str, float] = {}  # a NamedTuple has no default factory; nobody changes it
     began: float | None = None  # when it was taken up
-    seconds: float = 0.0  # that all of it took
+    seconds: float = 0.0  # that the worker was busy with it
 
 
 class SocketMailbox:
@@ -87,6 +87,7 @@ class SocketMailbox:
         self._prepared = prepared
         self._inbox = Inbox()
         self._ended = 0
+        self._free = 0.0  # when the last one ended
         self._reports: list[bytes] = []  # that are not sent yet
         self._held_since = 0.0
         self._entries: dict[int, Entry] = {}
@@ -112,15 +113,17 @@ class SocketMailbox:
         """As `Mailbox.ended`; the service learns the cost of a whole rung, this end that of its stages."""
         number = next(number for number, other in self._entries.items() if other is entry)
         del self._entries[number]
+        now = time.monotonic()
+        # Not the sum of its stages: what lies between them takes the worker's time as well.
+        took = now - max(self._free, now if entry.began is None else entry.began)
+        self._free = now
         self._ended += 1
         if self._ended % LEARNED == 0:
             for timed, seconds in entry.timed:
                 self._prepared.costs.learn(timed, entry.task.size, seconds)
         error = entry.ticket.future.exception()
         result = entry.ticket.future.result() if error is None else as_message(error)
-        self._tell(
-            Report(number, result, entry.place, entry.stage_ms, entry.began, entry.seconds), entry.task.lane
-        )
+        self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, took), entry.task.lane)
 
     def _tell(self, report: Report, lane: Lane = Lane.COLLISION) -> None:
         """Send a report, or hold it back for a moment while there is more work that is no more urgent."""

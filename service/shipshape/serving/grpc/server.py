@@ -24,8 +24,8 @@ from shipshape.v1 import shipshape_pb2_grpc
 
 SERVICES = (V1.service, GUARDED.service)
 LIVE = "live"  # the name under which grpc.health.v1 tells whether the process is worth keeping
-# Beside them, each contact that waits or is computed may hold a thread, so that the executor's queue, which is bounded
-# and refuses, is where contacts wait; streams of contacts and of reflection are bounded for the same reason.
+# Beside them, each contact that waits or is computed may hold a thread, so that the queue of the executor, bounded
+# and refusing, is where contacts wait; streams of contacts and of reflection are bounded for the same reason.
 SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and for reflection streams
 PING_INTERVAL_MS = (
     20_000  # that clients may ping at when idle; gRPC's own five minutes outlast what modems remember
