@@ -83,11 +83,11 @@ def test_each_lane_is_refused_when_its_share_of_the_queue_is_full(held):
 def test_who_has_no_time_behind_what_waits_is_told_how_long_that_is(held, monkeypatch):
     held.fill(Lane.TRACKING, 1)
     monkeypatch.setattr(held.executor, "wait", lambda lane: 3.0)
-    check_room(held.executor, Lane.TRACKING, held.now + 4.0)
+    check_room(held.executor, Lane.TRACKING, held.now + 5.0)
     with pytest.raises(Overloaded) as caught:
         check_room(held.executor, Lane.TRACKING, held.now + 1.0)
-    assert str(caught.value) == "expected 3750 ms for an answer behind all that waits, got 1000 ms"
-    assert caught.value.retry_after_s == pytest.approx(2.75)
+    assert str(caught.value) == "expected 4500 ms for an answer behind all that waits, got 1000 ms"
+    assert caught.value.retry_after_s == pytest.approx(3.5)
 
 
 def test_a_full_queue_refuses_before_the_body_is_there_and_counts_the_contacts():

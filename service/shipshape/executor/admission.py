@@ -7,6 +7,7 @@ from shipshape.executor.costs import Costs
 from shipshape.executor.entry import Entry, why_cheaper
 
 HEADROOM = 1.25  # over the predicted time: costs are means, and half of all work takes longer
+QUEUE_HEADROOM = 1.5  # over that of a queue: when much is asked, the doors take more of the cores
 
 
 def settle_rungs(entries: Sequence[Entry], costs: Costs, *, wait: float, slack: float, workers: int) -> None:
@@ -23,18 +24,22 @@ def settle_rungs(entries: Sequence[Entry], costs: Costs, *, wait: float, slack: 
         DeadlineExceeded: Not even alone would they end in time.
         Overloaded: They would, but for what stands before them; says when to come back.
     """
-    needed = full = 0.0
+    full = 0.0
     for place in range(max(len(entry.task.ladder) for entry in entries)):
         alone = _seconds(entries, costs, place, workers)
-        needed = wait + alone
-        full = full or needed
-        if HEADROOM * needed <= slack:
+        full = full or wait + alone
+        if with_headroom(wait, alone) <= slack:
             break
     else:
         if wait > 0:  # with nobody before it, let it try: costs are learned from what runs
-            _refuse(alone, needed, slack)
+            _refuse(wait, alone, slack)
     for entry in entries:
         entry.move_to(place, costs, why_cheaper(full, slack))
+
+
+def with_headroom(wait: float, alone: float) -> float:
+    """Seconds that can be promised to work that waits `wait` and takes `alone`, both as predicted."""
+    return QUEUE_HEADROOM * wait + HEADROOM * alone
 
 
 def _seconds(entries: Sequence[Entry], costs: Costs, place: int, workers: int) -> float:
@@ -42,12 +47,13 @@ def _seconds(entries: Sequence[Entry], costs: Costs, place: int, workers: int) -
     return max(*each, sum(each) / workers)
 
 
-def _refuse(alone: float, needed: float, slack: float) -> None:
+def _refuse(wait: float, alone: float, slack: float) -> None:
     if HEADROOM * alone > slack:
         raise DeadlineExceeded(
             f"expected at least {HEADROOM * alone * 1e3:.1f} ms for an answer, got {slack * 1e3:.1f} ms"
         )
+    needed = with_headroom(wait, alone)
     raise Overloaded(
-        f"expected {HEADROOM * needed * 1e3:.0f} ms for an answer behind all that waits, got {slack * 1e3:.0f} ms",
-        retry_after_s=HEADROOM * needed - slack,
+        f"expected {needed * 1e3:.0f} ms for an answer behind all that waits, got {slack * 1e3:.0f} ms",
+        retry_after_s=needed - slack,
     )

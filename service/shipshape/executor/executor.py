@@ -15,7 +15,7 @@ from operator import itemgetter
 from typing import Any
 
 from shipshape.errors import NotReady, Overloaded
-from shipshape.executor.admission import HEADROOM, settle_rungs
+from shipshape.executor.admission import settle_rungs, with_headroom
 from shipshape.executor.costs import Costs
 from shipshape.executor.counts import Counts
 from shipshape.executor.crew import Crew, Hand, ThreadCrew
@@ -126,7 +126,7 @@ class Executor:
     def promise(self, rung: Rung[Any], size: float, lane: Lane) -> float:
         """Seconds in which new work of this size and lane would be answered on this rung, as admission sees it."""
         with self._lock:
-            return HEADROOM * (self._wait(lane) + sum(self._costs.each([*rung.stages, rung], size)))
+            return with_headroom(self._wait(lane), sum(self._costs.each([*rung.stages, rung], size)))
 
     def wait(self, lane: Lane) -> float:
         """Seconds until a worker will probably be free for new work of this lane."""

@@ -2,7 +2,7 @@
 
 from shipshape.errors import DeadlineExceeded, Overloaded
 from shipshape.executor import Executor, Lane
-from shipshape.executor.admission import HEADROOM
+from shipshape.executor.admission import QUEUE_HEADROOM
 from shipshape.executor.lanes import places
 
 
@@ -28,8 +28,7 @@ def check_room(executor: Executor, lane: Lane, deadline: float) -> None:
         raise Overloaded(
             f"expected at most 0 more in the queue of {limit}, got 1", retry_after_s=wait / max(1, depth)
         )
-    if HEADROOM * wait > left:
-        needed = HEADROOM * wait
+    if (needed := QUEUE_HEADROOM * wait) > left:
         raise Overloaded(
             f"expected {needed * 1e3:.0f} ms for an answer behind all that waits, got {left * 1e3:.0f} ms",
             retry_after_s=needed - left,
