@@ -145,6 +145,17 @@ class Executor:
             return len(self._queues) + sum(map(_waiting, self._hands()))
 
     @property
+    def queued(self) -> int:
+        """Tasks that no worker has been given yet."""
+        return len(self._queues)
+
+    @property
+    def load(self) -> float:
+        """Tasks that wait or are computed, a worker: over 1, there is a queue."""
+        given = sum(len(hand.given) for crew in self._crews for hand in crew.hands)
+        return (len(self._queues) + given) / self.workers
+
+    @property
     def queue_age(self) -> float:
         """Seconds that the task has waited that has waited longest; 0 when none waits."""
         with self._lock:

@@ -147,7 +147,7 @@ class Core:
 
     def load(self) -> float:
         """Contacts that wait or are computed, a worker: over 1, there is a queue."""
-        return (self._executor.queue_depth + self._executor.running) / self._executor.workers
+        return self._executor.load
 
     def sheds(self, lane: Lane, deadline: float) -> None:
         """Raises at once what admission would say to even the cheapest contact of this lane; see `shedding`."""

@@ -43,14 +43,18 @@ class RemotePipeline:
         self.stages = [RemoteStage(name) for name in description.stages]
         self.costs = [(RemoteRung(name), seconds) for _, name, seconds in description.rungs]
         presets = [preset for preset, _, _ in description.rungs]
+        rungs = [(preset, rung) for preset, (rung, _) in zip(presets, self.costs, strict=True)]
         self._ladders = {
-            preset: [rung for (rung, _), other in zip(self.costs, presets, strict=True) if other is preset]
+            (preset, lowest): [
+                rung for other, rung in rungs if other is preset and Options(lowest_rung=lowest).accepts(rung.name)
+            ]
             for preset in Preset
+            for lowest in Rung
         }
 
     def ladder(self, options: Options) -> Sequence[RemoteRung]:
         """The rungs that the caller accepts, the best first."""
-        return [rung for rung in self._ladders[options.preset] if options.accepts(rung.name)]
+        return self._ladders[options.preset, options.lowest_rung]
 
 
 class RemoteModel:

@@ -21,8 +21,9 @@ def check_room(executor: Executor, lane: Lane, deadline: float) -> None:
     left = deadline - executor.clock()
     if left <= 0:
         raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
-    if not (depth := executor.queue_depth):
+    if not executor.queued:
         return
+    depth = executor.queue_depth
     wait, limit = executor.wait(lane), executor.queue_limit
     if depth >= places(lane, limit):
         raise Overloaded(
