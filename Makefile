@@ -64,7 +64,7 @@ LOCK = UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --uni
 
 lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
 	@$(LOCK) pyproject.toml requirements/build.in --output-file requirements/service.lock
-	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest \
+	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest --extra batch --extra ray \
 	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
 	@$(LOCK) requirements/clients.in --output-file requirements/clients.lock
 

@@ -8,19 +8,22 @@ import pytest
 
 from architecture.tree import ROOT
 
-# Imports all of the wheel in an interpreter without the lab's packages, nor those of the load test's extra.
+# Imports all of the wheel in an interpreter without the lab's packages, nor those of the extras.
 IMPORT_EVERYTHING = """
 import importlib, pkgutil, sys
 class Refuse:
     def find_spec(self, name, path=None, target=None):
         lab = {"torch", "shipshape_lab", "trimesh", "embreex", "matplotlib", "onnx"}
-        if name.partition(".")[0] in lab | {"aiohttp", "hdrh", "jinja2", "rich"}:
+        extras = {"aiohttp", "hdrh", "jinja2", "rich", "laspy", "mcap", "pyarrow", "rosbags", "ray"}
+        if name.partition(".")[0] in lab | extras:
             raise ModuleNotFoundError(f"the service asked for {name}", name=name)
 sys.meta_path.insert(0, Refuse())
 import shipshape
 assert shipshape.__file__.startswith(sys.argv[1]), shipshape.__file__
+of_extras = tuple("shipshape." + name for name in (
+    "loadtest", "batch", "pointfiles.las", "pointfiles.parquet", "pointfiles.recordings"))
 for module in pkgutil.walk_packages(shipshape.__path__, "shipshape."):
-    if not module.name.endswith("__main__") and not module.name.startswith("shipshape.loadtest"):
+    if not module.name.endswith("__main__") and not module.name.startswith(of_extras):
         importlib.import_module(module.name)
 """
 
