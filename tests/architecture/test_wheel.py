@@ -21,7 +21,7 @@ sys.meta_path.insert(0, Refuse())
 import shipshape
 assert shipshape.__file__.startswith(sys.argv[1]), shipshape.__file__
 of_extras = tuple("shipshape." + name for name in (
-    "loadtest", "batch", "pointfiles.las", "pointfiles.parquet", "pointfiles.recordings"))
+    "loadtest", "batch", "pages", "pointfiles.las", "pointfiles.parquet", "pointfiles.recordings"))
 for module in pkgutil.walk_packages(shipshape.__path__, "shipshape."):
     if not module.name.endswith("__main__") and not module.name.startswith(of_extras):
         importlib.import_module(module.name)
