@@ -31,7 +31,7 @@ def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--id-field", metavar="NAME", help="column, field or array that names clusters")
     scans = parser.add_argument_group("whole scans")
     scans.add_argument("--segment", action="store_true", help="split scans into clusters")
-    scans.add_argument("--gap", type=float, metavar="M", help="between two vessels at least (default: 2)")
+    scans.add_argument("--gap", type=float, metavar="M", help="between two vessels at least (default: 4)")
     scans.add_argument("--water-band", type=float, metavar="M", help="above the water, left out (default: 0.5)")
     scans.add_argument("--own-length", type=float, metavar="M", help="of one's own vessel, left out (default: 20)")
     scans.add_argument("--own-beam", type=float, metavar="M", help="of the same (default: 8)")
