@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float32, Int32
 
 from shipshape.batch.method import Segmentation
 
-CELLS_A_GAP = 4  # side of a cell of the grid: a fourth of the gap
+CELLS_A_GAP = 8  # side of a cell of the grid: an eighth of the gap, by which it is wrong at most
 WATER_SHARE = 0.01  # of the points may lie below the water: reflections
 MOST_CELLS, MOST_SIDE = 2**25, 2**20  # of the grid, which is coarser where a scan is wider than any LiDAR sees
 

@@ -1,0 +1,50 @@
+"""Ray Data on a local cluster of two nodes gives the rows that this machine would compute itself."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from batch.conftest import write_inputs
+
+pytest.importorskip("ray", reason="ray is not installed: the extra shipshape[ray]")
+MODELS = Path(__file__).parents[2] / "models"
+
+# In a process of its own: Ray leaves threads, sockets and environment variables behind.
+TWO_NODES = """
+import sys
+from ray.cluster_utils import Cluster
+from shipshape.batch import reading
+from shipshape.cli import main
+
+cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "object_store_memory": 2**27})
+cluster.add_node(num_cpus=1, object_store_memory=2**27)
+cluster.wait_for_nodes()
+assert len(cluster.list_all_nodes()) == 2
+try:
+    code = main([*sys.argv[1:], "--ray", cluster.address])
+finally:
+    import ray
+    ray.shutdown()
+    cluster.shutdown()
+sys.exit(code)
+"""
+
+
+@pytest.mark.skipif(
+    not (MODELS / "manifest.toml").exists(), reason="the default bundle (models/) is not trained yet"
+)
+def test_two_nodes_give_the_same_bytes(tmp_path):
+    inputs = write_inputs(tmp_path / "inputs", messages=6, clusters=6)
+    common = ["batch", str(inputs), "--bundle", str(MODELS), "--restored"]
+    quiet = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0", "RAY_DISABLE_MEMORY_MONITOR": "1"}
+    here = [sys.executable, "-m", "shipshape", *common, "--workers", "1", "--out", str(tmp_path / "here")]
+    there = [sys.executable, "-c", TWO_NODES, *common, "--out", str(tmp_path / "there")]
+    for command in (here, there):
+        ran = subprocess.run(command, env=quiet, capture_output=True, text=True, check=False, timeout=280)
+        assert ran.returncode == 1, ran.stderr[-3000:]  # one of the inputs is damaged
+    assert (tmp_path / "there/contacts.parquet").read_bytes() == (tmp_path / "here/contacts.parquet").read_bytes()
+    assert pq.read_table(tmp_path / "there/clouds").num_rows == 11
