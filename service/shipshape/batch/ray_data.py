@@ -49,7 +49,7 @@ class RayEngine:
         cores = int(ray.cluster_resources()["CPU"])  # type: ignore[no-untyped-call]
         reader, worker = (method, done), (self.folder, method, self.bundle, self.code)
         chunks = ray.data.from_items(rows, override_num_blocks=len(rows)).map_batches(
-            _Reader, fn_constructor_args=reader, batch_size=1, concurrency=(1, min(cores, len(rows)))
+            _Reader, fn_constructor_args=reader, batch_size=1, concurrency=(1, min(cores, len(rows))), num_cpus=0
         )
         items = chunks.map_batches(_Worker, fn_constructor_args=worker, batch_size=1, concurrency=(1, cores))
         for row in items.iter_rows():
