@@ -27,10 +27,11 @@ for module in pkgutil.walk_packages(shipshape.__path__, "shipshape."):
         importlib.import_module(module.name)
 """
 
-LOADTEST = """
-from shipshape.cli import main
-assert main(["loadtest", "grpc://127.0.0.1:1"]) == 2
-"""
+# What is asked of a command whose extra is not installed, and the first library that it misses.
+OF_EXTRAS = {
+    "loadtest": (["loadtest", "grpc://127.0.0.1:1"], "aiohttp"),
+    "batch": (["batch", "a.npy", "--out", "out"], "pyarrow"),
+}
 
 
 @pytest.fixture(scope="module")
@@ -67,11 +68,13 @@ def test_every_module_of_the_wheel_imports_without_the_lab(unpacked):
     _run(["-c", IMPORT_EVERYTHING, str(unpacked)], unpacked)
 
 
-def test_a_load_test_without_its_extra_says_what_is_missing(unpacked):
-    script = IMPORT_EVERYTHING.partition("import shipshape")[0] + LOADTEST
-    ran = _run(["-c", script], unpacked)
+@pytest.mark.parametrize("extra", OF_EXTRAS)
+def test_a_command_without_its_extra_says_what_is_missing(unpacked, extra):
+    words, library = OF_EXTRAS[extra]
+    asked = f"from shipshape.cli import main\nassert main({words}) == 2\n"
+    ran = _run(["-c", IMPORT_EVERYTHING.partition("import shipshape")[0] + asked], unpacked)
     assert ran.stderr == (
-        "shipshape: expected the libraries of the extra shipshape[loadtest] to be installed, got no aiohttp\n"
+        f"shipshape: expected the libraries of the extra shipshape[{extra}] to be installed, got no {library}\n"
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from batch.written import cloud, packed, write_mcap, write_ros2
 from builders_recognition import side_of_hull
-from shipshape.batch import rows
+from shipshape.batch import reading, rows
 from shipshape.bundle import load_bundle
 from shipshape.cli import main
 from shipshape.pipeline import Pipeline
@@ -99,7 +99,7 @@ def test_what_is_refused_is_told_and_ends_nothing(inputs, tmp_path, engine, caps
     page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert "expected c.bag to be a complete recording" in page
     assert "<script" not in page
-    assert not re.search(r"(src|href)=\"?http|url\(", page)
+    assert not re.search(r"(src|href)=\"?http|url\\((?!#)", page)
 
 
 def test_inputs_that_are_all_read_are_a_success(tmp_path, engine):
@@ -176,6 +176,24 @@ def test_a_wrong_command_gets_one_sentence(tmp_path, capsys, arguments, sentence
     assert run(tmp_path / "hull.npy", "--out", tmp_path / "out", *arguments) == 2
     assert capsys.readouterr().err == f"shipshape: {sentence}\n"
     assert not (tmp_path / "out").exists()
+
+
+def test_a_fault_in_a_reader_does_not_end_the_run(tmp_path, engine, monkeypatch, caplog):
+    for name in ("a", "b"):
+        np.save(tmp_path / f"{name}.npy", HULL + (name == "b"))
+    whole = reading.read_named_clusters
+
+    def broken(path, **arguments):
+        if path.name == "a.npy":
+            raise ZeroDivisionError
+        return whole(path, **arguments)
+
+    monkeypatch.setattr(reading, "read_named_clusters", broken)
+    assert run(tmp_path / "a.npy", tmp_path / "b.npy", "--out", tmp_path / "out") == 1
+    assert len(table_of(tmp_path / "out")) == 1
+    record = summary_of(tmp_path / "out")["inputs"][0]
+    assert record["error"] == "expected a.npy to be readable, got a fault of Shipshape: ZeroDivisionError"
+    assert "ZeroDivisionError" in caplog.text
 
 
 def test_a_folder_without_inputs_is_told(tmp_path, capsys):

@@ -138,6 +138,14 @@ def test_two_runs_do_not_share_a_folder(inputs, tmp_path, engine, capsys):
     assert f"expected {tmp_path / 'out'} to be free, got another run" in capsys.readouterr().err
 
 
+def test_a_folder_of_something_else_is_left_alone(inputs, tmp_path, engine, capsys):
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "letter.tmp").write_text("dear")
+    assert run(inputs, tmp_path / "home") == 2
+    assert "home to be empty or to hold results, got letter.tmp in it" in capsys.readouterr().err
+    assert (tmp_path / "home" / "letter.tmp").exists()
+
+
 def test_a_damaged_part_is_told(inputs, tmp_path, engine, capsys):
     run(inputs, tmp_path / "out")
     part = min((tmp_path / "out/parts").iterdir())

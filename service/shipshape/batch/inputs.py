@@ -85,7 +85,12 @@ def shown(path: Path) -> str:
 
 
 def _within(folder: Path, out: Path) -> Iterator[Path]:
-    for entry in sorted(folder.iterdir()):
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError:  # it becomes an input, so that its refusal is told with all others
+        yield folder
+        return
+    for entry in entries:
         if entry.is_dir() and not is_recording(entry):
             if entry.resolve() != out:
                 yield from _within(entry, out)

@@ -7,6 +7,7 @@ from shipshape.bundle import UNKNOWN
 from shipshape.pages.svg import FIRST, LIMIT, SECOND, to_svg
 
 REFUSED = "refused"
+TICKS_MS = [digit * decade for decade in (0.1, 1, 10, 100, 1000) for digit in (1, 2, 5)]
 
 
 def vessels(report: Report) -> str:
@@ -53,6 +54,9 @@ def milliseconds(report: Report) -> str:
                 colour = SECOND if name == "p50" else LIMIT
                 axes.axvline(value, color=colour, lw=1.2, ls="--", label=f"{name}, {value:.1f} ms")
         axes.set_xscale("log")
+        ticks = [tick for tick in TICKS_MS if shown and shown[0][0] <= tick <= shown[-1][1]]
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
         axes.set(xlabel="ms, all stages together", ylabel="contacts")
 
     return to_svg(draw, "Milliseconds of an answer")

@@ -1,5 +1,6 @@
 """One input -> its clouds in chunks, the same in every run; memory holds one chunk and one message."""
 
+import logging
 from collections.abc import Container, Iterator
 
 import numpy as np
@@ -15,6 +16,8 @@ CHUNK_CLOUDS = 256
 CHUNK_POINTS = 2**19
 
 _NO_POINTS = np.empty((0, 3), np.float32)
+
+log = logging.getLogger(__name__)
 
 
 def read(source: Source, method: Method, done: Container[str]) -> Iterator[Chunk | Ending]:
@@ -34,6 +37,9 @@ def read(source: Source, method: Method, done: Container[str]) -> Iterator[Chunk
                     number, clouds, points = number + 1, [], 0
     except FileError as failed:
         error = str(failed)
+    except Exception as fault:  # nothing that one file holds may end a run
+        log.exception("%s could not be read", source.path)
+        error = f"expected {source.path.name} to be readable, got a fault of Shipshape: {type(fault).__name__}"
     if clouds:
         if part_name(source.sha256, number) not in done:
             yield Chunk(source.sha256, number, clouds, share)

@@ -20,7 +20,7 @@ import orjson
 from shipshape.batch.units import Ending, Part, part_names
 from shipshape.errors import FileError, SettingsError
 
-TEMPORARY = ".tmp"
+TEMPORARY, LOCK = ".tmp", ".lock"
 
 
 class Results:
@@ -79,7 +79,7 @@ def open_results(folder: Path, identity: dict[str, Any], *, clouds: bool) -> Ite
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with (folder / ".lock").open("w") as lock:
+        with (folder / LOCK).open("w") as lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
@@ -104,8 +104,8 @@ def _check_identity(folder: Path, identity: dict[str, Any]) -> None:
     path = folder / "run.json"
     wanted = orjson.loads(orjson.dumps(identity))
     if not path.exists():
-        if any(folder.glob("*.parquet")):
-            raise SettingsError(f"expected {folder} to be empty or to hold results, got other Parquet files in it")
+        if others := {entry.name for entry in folder.iterdir()} - {LOCK, f"{path.name}{TEMPORARY}"}:
+            raise SettingsError(f"expected {folder} to be empty or to hold results, got {min(others)} in it")
         write_whole(path, orjson.dumps(wanted, option=orjson.OPT_INDENT_2))
         return
     there = orjson.loads(path.read_bytes())

@@ -20,6 +20,7 @@ STYLE: Mapping[Any, Any] = {
     "axes.labelcolor": INK,
     "axes.edgecolor": GRID,
     "axes.grid": True,
+    "axes.axisbelow": True,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "grid.color": GRID,
