@@ -1,6 +1,7 @@
 """Ray Data on a local cluster of two nodes gives the rows that this machine would compute itself."""
 
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -9,9 +10,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from batch.conftest import write_inputs
+from shipshape.cli import main
 
 pytest.importorskip("ray", reason="ray is not installed: the extra shipshape[ray]")
 MODELS = Path(__file__).parents[2] / "models"
+pytestmark = pytest.mark.skipif(
+    not (MODELS / "manifest.toml").exists(), reason="the default bundle (models/) is not trained yet"
+)
 
 # In a process of its own: Ray leaves threads, sockets and environment variables behind.
 TWO_NODES = """
@@ -34,9 +39,17 @@ sys.exit(code)
 """
 
 
-@pytest.mark.skipif(
-    not (MODELS / "manifest.toml").exists(), reason="the default bundle (models/) is not trained yet"
-)
+def test_nobody_there_is_told(tmp_path, capsys):
+    (tmp_path / "a.npy").touch()
+    with socket.socket() as bound:  # nobody listens on it
+        bound.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{bound.getsockname()[1]}"
+        given = ["batch", str(tmp_path / "a.npy"), "--out", str(tmp_path / "out"), "--bundle", str(MODELS)]
+        assert main([*given, "--ray", address]) == 2
+    sentence = f"expected a Ray cluster at {address}, got ConnectionRefusedError"
+    assert capsys.readouterr().err == f"shipshape: {sentence}\n"
+
+
 def test_two_nodes_give_the_same_bytes(tmp_path):
     inputs = write_inputs(tmp_path / "inputs", messages=6, clusters=6)
     common = ["batch", str(inputs), "--bundle", str(MODELS), "--restored"]

@@ -5,6 +5,7 @@ Needs the extra shipshape[ray]. Each machine sees inputs and bundle under the sa
 
 import logging
 import pickle
+import socket
 from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import ray
+from ray.exceptions import RayError
 
 from shipshape.batch.identity import code_digest
 from shipshape.batch.method import Method
@@ -19,8 +21,10 @@ from shipshape.batch.reading import read
 from shipshape.batch.recognition import Recogniser, answers_of, warm_up
 from shipshape.batch.units import Chunk, Ending, Part, Source
 from shipshape.bundle import load_bundle
-from shipshape.errors import BundleError
+from shipshape.errors import BundleError, SettingsError, ShipshapeError
 from shipshape.pipeline import Pipeline
+
+CONNECT_S = 10.0
 
 Batch = dict[str, Any]  # of one row, whose column `item` holds a pickled value
 
@@ -35,14 +39,28 @@ class RayEngine:
 
     @classmethod
     def start(cls, address: str, folder: Path) -> "RayEngine":
-        """Connect to the cluster at an address, `local` starts one of this machine alone."""
-        ray.init(None if address == "local" else address, log_to_driver=False, logging_level=logging.WARNING)
+        """Connect to the cluster at an address, `local` starts one of this machine alone.
+
+        Raises:
+            SettingsError: None answers there.
+            BundleError: The bundle cannot be used.
+        """
+        bundle = load_bundle(folder).digest
+        try:
+            _knock(address)
+            ray.init(None if address == "local" else address, log_to_driver=False, logging_level=logging.WARNING)
+        except (OSError, ValueError, RuntimeError) as error:
+            raise SettingsError(f"expected a Ray cluster at {address}, got {type(error).__name__}") from error
         context = ray.data.DataContext.get_current()
         context.enable_progress_bars = False  # the run has its own
-        return cls(load_bundle(folder).digest, code_digest(), folder.resolve())
+        return cls(bundle, code_digest(), folder.resolve())
 
     def run(self, sources: Iterable[Source], method: Method, done: Container[str]) -> Iterator[Part | Ending]:
-        """As `Engine.run`, in any order."""
+        """As `Engine.run`, in any order.
+
+        Raises:
+            ShipshapeError: A worker failed.
+        """
         rows = [_row(Source(source.path.resolve(), source.sha256, source.size)) for source in sources]
         if not rows:
             return
@@ -52,8 +70,24 @@ class RayEngine:
             _Reader, fn_constructor_args=reader, batch_size=1, concurrency=(1, min(cores, len(rows))), num_cpus=0
         )
         items = chunks.map_batches(_Worker, fn_constructor_args=worker, batch_size=1, concurrency=(1, cores))
-        for row in items.iter_rows():
-            yield pickle.loads(row["item"])
+        try:
+            for row in items.iter_rows():
+                yield pickle.loads(row["item"])
+        except RayError as error:
+            cause = getattr(error, "cause", None)
+            if isinstance(cause, ShipshapeError):
+                raise cause from error
+            raise ShipshapeError(
+                f"expected every worker of the Ray cluster to answer, got {type(error).__name__}: run the same "
+                "command again, it goes on where it was stopped"
+            ) from error
+
+
+def _knock(address: str) -> None:
+    """Raises OSError when nobody listens at HOST:PORT: Ray itself would try for minutes."""
+    host, _, port = address.rpartition(":")
+    if port.isdecimal() and "/" not in host:
+        socket.create_connection((host, int(port)), CONNECT_S).close()
 
 
 class _Reader:

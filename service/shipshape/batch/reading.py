@@ -27,8 +27,9 @@ def read(source: Source, method: Method, done: Container[str]) -> Iterator[Chunk
     points, share, error = 0, 0.0, ""
     try:
         for message in _messages(source, method):
-            messages, share = message.index + 1, message.share
-            for cloud in _clouds(message):
+            messages, before = message.index + 1, share
+            for index, cloud in enumerate(_clouds(message), 1):
+                share = before + (message.share - before) * index / max(len(message.clusters), 1)
                 clouds.append(cloud)
                 points += len(cloud.points_level)
                 if len(clouds) == CHUNK_CLOUDS or points >= CHUNK_POINTS:
