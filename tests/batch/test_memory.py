@@ -39,8 +39,20 @@ loaded = object()
 def work(chunk):
     return Part(chunk.sha256, f"{id(loaded)} {os.getppid()}", 0.0, 0, 0, b"")
 executor = fork_workers(work, 2)
-parts = list(run_in_processes(executor, [Chunk("0" * 64, number, [], 0.0) for number in range(8)]))
+parts = list(run_in_processes(executor, 2, [Chunk("0" * 64, number, [], 0.0) for number in range(8)]))
 assert {part.name for part in parts} == {f"{id(loaded)} {os.getpid()}"}
+"""
+
+DYING = """
+import os
+from shipshape.batch.processes import fork_workers, run_in_processes
+from shipshape.batch.units import Chunk
+from shipshape.errors import ShipshapeError
+executor = fork_workers(lambda chunk: os._exit(9), 2)
+try:
+    list(run_in_processes(executor, 2, [Chunk("0" * 64, 0, [], 0.0)]))
+except ShipshapeError as error:
+    print(error)
 """
 
 
@@ -111,3 +123,11 @@ def test_chunks_hold_few_points(recordings, monkeypatch):
 
 def test_workers_are_forked_from_what_their_parent_loaded():
     subprocess.run([sys.executable, "-c", FORKED], check=True)
+
+
+def test_a_worker_that_dies_ends_the_run_in_one_sentence():
+    ran = subprocess.run([sys.executable, "-c", DYING], check=False, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.startswith(
+        "expected every worker to live, but one died, for want of memory perhaps: run the"
+    )

@@ -44,6 +44,7 @@ class LocalEngine:
     bundle: str
     code: str
     executor: Executor
+    workers: int
 
     @classmethod
     def start(cls, folder: Path, method: Method, workers: int) -> "LocalEngine":
@@ -52,12 +53,12 @@ class LocalEngine:
         warm_up(pipeline, method.options)
         bundle, code = pipeline.bundle.digest, code_digest()
         recogniser = Recogniser(answers_of(pipeline, method.options), method, bundle, code)
-        return cls(bundle, code, fork_workers(recogniser, workers))
+        return cls(bundle, code, fork_workers(recogniser, workers), workers)
 
     def run(self, sources: Iterable[Source], method: Method, done: Container[str]) -> Iterator[Part | Ending]:
         """As `Engine.run`."""
         chunks = (chunk for source in sources for chunk in read(source, method, done))
-        return run_in_processes(self.executor, chunks)
+        return run_in_processes(self.executor, self.workers, chunks)
 
 
 @dataclass(frozen=True, slots=True)

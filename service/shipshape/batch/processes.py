@@ -36,13 +36,18 @@ def fork_workers(work: Work, count: int) -> Executor:
     return executor
 
 
-def run_in_processes(executor: Executor, chunks: Iterable[Chunk | Ending]) -> Iterator[Part | Ending]:
+def run_in_processes(executor: Executor, count: int, chunks: Iterable[Chunk | Ending]) -> Iterator[Part | Ending]:
     """The parts of all chunks, in the order of the chunks, and the endings between them.
+
+    Args:
+        executor: What `fork_workers` gave.
+        count: Of its processes.
+        chunks: Read a few ahead of the part that is awaited.
 
     Raises:
         ShipshapeError: A worker died.
     """
-    yield from run_ahead(executor, _run, chunks, AHEAD * executor._max_workers)  # type: ignore[attr-defined]
+    yield from run_ahead(executor, _run, chunks, AHEAD * count)
 
 
 def run_ahead(
