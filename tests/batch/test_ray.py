@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from batch.conftest import write_inputs
+from batch.written import write_inputs
 from shipshape.cli import main
 
 pytest.importorskip("ray", reason="ray is not installed: the extra shipshape[ray]")

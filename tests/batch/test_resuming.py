@@ -12,7 +12,7 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from batch.conftest import write_inputs
+from batch.written import write_inputs
 from shipshape.batch import command
 from shipshape.batch.results import open_results
 from shipshape.cli import main

@@ -9,6 +9,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
+from builders_recognition import side_of_hull
+
 KIND = "sensor_msgs/msg/PointCloud2"
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 XYZ = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
@@ -87,3 +89,20 @@ def write_mcap(path: Path, clouds, *, ros1: bool = False, topic: str = "/points"
             writer.add_message(channel, START_NS + index, data, START_NS + index)
         writer.finish()
     return path
+
+
+def write_inputs(folder: Path, messages: int = 15, clusters: int = 10) -> Path:
+    """A folder of a recording, of a file of clusters of which the fourth has too few points, and of no bag."""
+    folder.mkdir()
+    rng = np.random.default_rng(1)
+
+    def hull() -> np.ndarray:
+        place = (float(rng.uniform(30, 90)), float(rng.uniform(-30, 30)), -3.0)
+        return side_of_hull(float(rng.uniform(-3, 3)), place)
+
+    write_mcap(folder / "b.mcap", [cloud(packed(hull())) for _ in range(messages)], chunk=2000)
+    hulls = [hull() for _ in range(clusters)]
+    hulls[3] = hulls[3][:5]  # too few points
+    np.savez(folder / "a.npz", points=np.concatenate(hulls), n=[len(points) for points in hulls])
+    (folder / "c.bag").write_bytes(b"no bag")
+    return folder
