@@ -77,6 +77,7 @@ LOCK = UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --uni
 lock: $(VENV)/.dev ## resolve requirements/*.lock again from the pyproject files
 	@$(LOCK) pyproject.toml requirements/build.in --extra otel --output-file requirements/service.lock
 	@$(LOCK) pyproject.toml lab/pyproject.toml requirements/build.in requirements/dev.in --extra loadtest --extra otel \
+	  --extra batch --extra ray \
 	  --constraint requirements/service.lock --no-emit-package shipshape --output-file requirements/dev.lock
 	@$(LOCK) requirements/clients.in --output-file requirements/clients.lock
 

@@ -124,7 +124,7 @@ def test_no_returns_of_an_organised_pcd_are_dropped_and_other_nan_is_kept(tmp_pa
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
-        ("cloud.las", b"LASF", f"a file ending in {' '.join(SUFFIXES)}, got cloud.las"),
+        ("cloud.stl", b"solid", f"a file ending in {' '.join(SUFFIXES)}, got cloud.stl"),
         ("cloud", b"x", "got cloud"),
         *[(f"empty{suffix}", b"", "bytes, got 0 bytes") for suffix in SUFFIXES],
         ("four.npy", npy_bytes(np.zeros((5, 4), np.float32)), "shape (N, 3), got float32 of shape (5, 4)"),

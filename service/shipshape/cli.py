@@ -1,4 +1,4 @@
-"""The command line: shipshape serve | classify | check | bundle verify | loadtest | token | admin.
+"""The command line: shipshape serve | classify | batch | check | bundle verify | loadtest | token | admin.
 
 Exit codes: 0 all went well; 1 a cluster or file was refused, or the service failed; 2 the command, a setting
 or the bundle is wrong. Of loadtest: 0 the budget was held; 1 it was not; 2 as above, or no target; 3 the tool was
@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
+from shipshape.cli_batch import BATCH_NOTES, add_batch_arguments
 from shipshape.errors import ShipshapeError
 from shipshape.types import ImageMethod, Preset
 
@@ -33,6 +34,7 @@ examples:
 
 files (metres, level frame: origin at the LiDAR, x ahead, y to port, z up):
   .npy (N, 3)   .npz `points` (sum N, 3) and `n`, points a cluster   .csv .xyz   .pcd   .ply
+  with the extra shipshape[batch] also .las .laz .parquet
 
 --json prints one object a cluster and line:
   file, index           where the cluster came from
@@ -104,6 +106,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_serve(commands)
     _add_classify(commands)
+    _add_batch(commands)
     _add_check(commands)
     _add_bundle(commands)
     _add_loadtest(commands)
@@ -154,6 +157,17 @@ def _add_classify(commands: _Commands) -> None:
     parser.add_argument(
         "--png", type=Path, metavar="DIR", help="draw a picture of each cluster into DIR, as NAME.png"
     )
+    _add_how(parser)
+
+
+def _add_batch(commands: _Commands) -> None:
+    parser = _add(commands, "batch", "recognise whole recordings into one table and a report", BATCH_NOTES)
+    parser.set_defaults(command="batch")
+    add_batch_arguments(parser)
+    _add_how(parser)
+
+
+def _add_how(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preset", type=Preset, choices=list(Preset), default=Preset.BEST)
     parser.add_argument(
         "--image-method", type=ImageMethod, choices=list(ImageMethod), help="with --preset paper alone"

@@ -82,6 +82,17 @@ def verify(arguments: argparse.Namespace) -> int:
     return OK
 
 
+def batch(arguments: argparse.Namespace) -> int:
+    """Recognise whole recordings."""
+    try:
+        from shipshape.batch.command import batch as run  # noqa: PLC0415  its libraries are an extra
+    except ModuleNotFoundError as error:
+        raise SettingsError(
+            f"expected the libraries of the extra shipshape[batch] to be installed, got no {error.name}"
+        ) from error
+    return run(arguments)
+
+
 def loadtest(arguments: argparse.Namespace) -> int:
     """Test a running service as its client."""
     try:
@@ -103,6 +114,7 @@ def token(arguments: argparse.Namespace) -> int:
 
 COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "classify": classify,
+    "batch": batch,
     "check": check,
     "bundle verify": verify,
     "loadtest": loadtest,

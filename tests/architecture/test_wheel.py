@@ -9,26 +9,30 @@ import pytest
 from architecture.tree import ROOT
 from shipshape.console import built
 
-# Imports all of the wheel in an interpreter without the lab's packages, nor those of the load test's extra.
+# Imports all of the wheel in an interpreter without the lab's packages, nor those of the extras.
 IMPORT_EVERYTHING = """
 import importlib, pkgutil, sys
 class Refuse:
     def find_spec(self, name, path=None, target=None):
         lab = {"torch", "shipshape_lab", "trimesh", "embreex", "matplotlib", "onnx"}
-        if name.partition(".")[0] in lab | {"aiohttp", "hdrh", "jinja2", "rich"}:
+        extras = {"aiohttp", "hdrh", "jinja2", "rich", "laspy", "mcap", "pyarrow", "rosbags", "ray"}
+        if name.partition(".")[0] in lab | extras:
             raise ModuleNotFoundError(f"the service asked for {name}", name=name)
 sys.meta_path.insert(0, Refuse())
 import shipshape
 assert shipshape.__file__.startswith(sys.argv[1]), shipshape.__file__
+of_extras = tuple("shipshape." + name for name in (
+    "loadtest", "batch", "pages", "pointfiles.las", "pointfiles.parquet", "pointfiles.recordings"))
 for module in pkgutil.walk_packages(shipshape.__path__, "shipshape."):
-    if not module.name.endswith("__main__") and not module.name.startswith("shipshape.loadtest"):
+    if not module.name.endswith("__main__") and not module.name.startswith(of_extras):
         importlib.import_module(module.name)
 """
 
-LOADTEST = """
-from shipshape.cli import main
-assert main(["loadtest", "grpc://127.0.0.1:1"]) == 2
-"""
+# What is asked of a command whose extra is not installed, and the first library that it misses.
+OF_EXTRAS = {
+    "loadtest": (["loadtest", "grpc://127.0.0.1:1"], "aiohttp"),
+    "batch": (["batch", "a.npy", "--out", "out"], "pyarrow"),
+}
 
 
 @pytest.fixture(scope="module")
@@ -66,11 +70,13 @@ def test_every_module_of_the_wheel_imports_without_the_lab(unpacked):
     _run(["-c", IMPORT_EVERYTHING, str(unpacked)], unpacked)
 
 
-def test_a_load_test_without_its_extra_says_what_is_missing(unpacked):
-    script = IMPORT_EVERYTHING.partition("import shipshape")[0] + LOADTEST
-    ran = _run(["-c", script], unpacked)
+@pytest.mark.parametrize("extra", OF_EXTRAS)
+def test_a_command_without_its_extra_says_what_is_missing(unpacked, extra):
+    words, library = OF_EXTRAS[extra]
+    asked = f"from shipshape.cli import main\nassert main({words}) == 2\n"
+    ran = _run(["-c", IMPORT_EVERYTHING.partition("import shipshape")[0] + asked], unpacked)
     assert ran.stderr == (
-        "shipshape: expected the libraries of the extra shipshape[loadtest] to be installed, got no aiohttp\n"
+        f"shipshape: expected the libraries of the extra shipshape[{extra}] to be installed, got no {library}\n"
     )
 
 

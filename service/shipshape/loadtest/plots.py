@@ -1,42 +1,19 @@
 """The pictures of a report: SVG whose colours are the page's, light or dark."""
 
-import io
-import re
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
 from shipshape.loadtest.budget import Verdict
 from shipshape.loadtest.outcomes import Outcome
 from shipshape.loadtest.report import Step
 from shipshape.loadtest.summary import Summary
+from shipshape.pages.svg import FIRST, GRID, LIMIT, SECOND, to_svg
 
-# Each stands in the SVG for a variable of the page's style sheet.
-INK, GRID, LIMIT, FIRST, SECOND = "#010101", "#020202", "#030303", "#040404", "#050505"
-VARIABLES: Mapping[str, str] = {INK: "ink", GRID: "grid", LIMIT: "limit", FIRST: "first", SECOND: "second"}
 OUTCOMES: Mapping[str, str] = {outcome.label: f"#1010{outcome:02x}" for outcome in Outcome}
-STYLE: Mapping[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "shipshape",
-    "font.size": 11,
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": GRID,
-    "axes.grid": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": GRID,
-    "grid.linewidth": 0.6,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "legend.frameon": False,
-}
-WIDTH, HEIGHT = 7.2, 3.2  # inches
+COLOURS: Mapping[str, str] = {colour: name for name, colour in OUTCOMES.items()}
 
 
 def percentiles(run: Summary) -> str:
@@ -57,7 +34,7 @@ def percentiles(run: Summary) -> str:
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set(xlabel="of the answers", ylabel="ms or less", ylim=(0, None))
 
-    return _svg(draw, "Latency at each percentile")
+    return to_svg(draw, "Latency at each percentile", COLOURS)
 
 
 def latency_over_time(run: Summary) -> str:
@@ -73,7 +50,7 @@ def latency_over_time(run: Summary) -> str:
         _limit(axes, run)
         axes.set(xlabel="s, when due", ylabel="ms since due", ylim=(0, None))
 
-    return _svg(draw, "Latency over time")
+    return to_svg(draw, "Latency over time", COLOURS)
 
 
 def outcomes_over_time(run: Summary) -> str:
@@ -91,7 +68,7 @@ def outcomes_over_time(run: Summary) -> str:
             below += height
         axes.set(xlabel="s, when due", ylabel="requests/s")
 
-    return _svg(draw, "Outcomes over time")
+    return to_svg(draw, "Outcomes over time", COLOURS)
 
 
 def sweep_curve(steps: Sequence[Step]) -> str:
@@ -110,25 +87,9 @@ def sweep_curve(steps: Sequence[Step]) -> str:
                 axes.scatter([step.rate for step in some], goodput, color=colour, label=verdict, zorder=3, s=36)
         axes.set(xlabel="offered contacts/s", ylabel="in time, contacts/s", xlim=(0, None), ylim=(0, None))
 
-    return _svg(draw, "Goodput at each rate")
+    return to_svg(draw, "Goodput at each rate", COLOURS)
 
 
 def _limit(axes: Axes, run: Summary) -> None:
     limit_ms = run.budget.limit_s * 1e3
     axes.axhline(limit_ms, color=LIMIT, lw=1.2, ls="--", label=f"budget, {limit_ms:g} ms")
-
-
-def _svg(draw: Callable[[Axes], None], title: str) -> str:
-    """The picture as an element of an HTML page, named for those who cannot see it."""
-    with mpl.rc_context(dict(STYLE)):
-        figure = Figure((WIDTH, HEIGHT), layout="constrained")
-        axes = figure.subplots()
-        draw(axes)
-        axes.legend(loc="lower left", ncols=len(Outcome), bbox_to_anchor=(0, 1), borderaxespad=0.2)
-        file = io.StringIO()
-        figure.savefig(file, format="svg", transparent=True, metadata={"Date": None, "Title": title})
-    svg = file.getvalue()
-    svg = svg[svg.index("<svg") :]
-    svg = re.sub(r' width="[^"]+pt"', "", re.sub(r' height="[^"]+pt"', "", svg, count=1), count=1)
-    colours = {**VARIABLES, **{colour: name for name, colour in OUTCOMES.items()}}
-    return re.sub("|".join(colours), lambda match: f"var(--{colours[match[0]]})", svg)

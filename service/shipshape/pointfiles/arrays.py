@@ -4,28 +4,35 @@ import io
 import math
 import zipfile
 import zlib
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32
 
 from shipshape.errors import FileError
-from shipshape.pointfiles.columns import as_points, cause, listed
+from shipshape.pointfiles.clusters import MAX_CLUSTERS, Cluster, id_name, id_text
+from shipshape.pointfiles.columns import as_points, cause, clusters_from_records, listed
 
-MAX_CLUSTERS = 100_000  # of one file; each costs memory of its own, however few points it has
 _HEADER_BYTES = 4096
 
 _NPZ_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError)
 
 
-def read_npy(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
-    """The one cluster of a .npy file, (N, 3) floats or records with the fields x, y, z."""
+def read_npy(path: Path, max_bytes: int, id_names: Collection[str]) -> list[Cluster]:
+    """The cluster of a .npy file, (N, 3) floats or records with the fields x, y, z; or one of each id."""
     with path.open("rb") as stream:
-        return [as_points(_read_array(stream, path.stat().st_size, path.name), path.name)]
+        array = _read_array(stream, path.stat().st_size, path.name)
+    if array.dtype.names:
+        return clusters_from_records(array, id_names, path.name)
+    return [Cluster(as_points(array, path.name))]
 
 
-def read_npz(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
-    """The clusters of a .npz file with the arrays `points` (sum N, 3) and `n`, the points of each cluster."""
+def read_npz(path: Path, max_bytes: int, id_names: Collection[str]) -> list[Cluster]:
+    """The clusters of a .npz file with the arrays `points` (sum N, 3) and `n`, the points of each cluster.
+
+    An array of their ids may be there too.
+    """
     try:
         with zipfile.ZipFile(path) as archive:
             names = [name.removesuffix(".npy") for name in archive.namelist()]
@@ -33,9 +40,15 @@ def read_npz(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
                 raise FileError(f"expected the arrays points and n in {path.name}, got {listed(names)}")
             n = _read_counts(archive, path.name)
             points = as_points(_read_member(archive, "points", max_bytes), f"points in {path.name}")
+            named = id_name(names, id_names)
+            ids = None if named is None else _read_member(archive, named, max_bytes)
     except _NPZ_ERRORS as error:
         raise FileError(f"expected {path.name} to be a complete .npz file, got: {cause(error)}") from error
-    return _split(points, n, path.name)
+    clouds = _split(points, n, path.name)
+    texts = [""] * len(clouds) if ids is None else [id_text(value) for value in ids.reshape(-1)]
+    if len(texts) != len(clouds):
+        raise FileError(f"expected {len(clouds)} ids in {named} of {path.name}, one a cluster, got {len(texts)}")
+    return [Cluster(cloud, text, apart=True) for cloud, text in zip(clouds, texts, strict=True)]
 
 
 def _read_member(archive: zipfile.ZipFile, name: str, max_bytes: int) -> np.ndarray:

@@ -1,13 +1,20 @@
 """What the formats share: finding x, y and z, and refusing what is not a plain array of them."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from jaxtyping import Float32
 
 from shipshape.errors import FileError
+from shipshape.pointfiles.clusters import Cluster, id_name, split_by_id
 
 AXES = ("x", "y", "z")
+
+
+def clusters_from_records(records: np.ndarray, id_names: Collection[str], what: str) -> list[Cluster]:
+    """The fields x, y and z of a structured array as clusters: one, or one of each id."""
+    named = id_name(records.dtype.names or (), id_names)
+    return split_by_id(xyz_from_records(records, what), None if named is None else records[named], what)
 
 
 def xyz_from_records(records: np.ndarray, what: str) -> Float32[np.ndarray, "n 3"]:
@@ -36,9 +43,9 @@ def described(dtype: np.dtype) -> str:
     return listed([f"{name} {dtype[name]}" for name in dtype.names])
 
 
-def listed(words: Sequence[str], most: int = 12) -> str:
+def listed(words: Sequence[str], most: int = 12, longest: int = 40) -> str:
     """The first words, comma-separated; a message must stay one readable sentence."""
-    shown = ", ".join(word[:40] for word in words[:most]) or "none"
+    shown = ", ".join(word[:longest] for word in words[:most]) or "none"
     return shown if len(words) <= most else f"{shown} and {len(words) - most} more"
 
 

@@ -1,20 +1,25 @@
 """Point Cloud Data files, in all three encodings."""
 
 import struct
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32
 from pypcd4.pypcd4 import Encoding, MetaData, PointCloud
 
 from shipshape.errors import FileError
-from shipshape.pointfiles.columns import cause, xyz_from_records
+from shipshape.pointfiles.clusters import Cluster
+from shipshape.pointfiles.columns import cause, clusters_from_records
 
 _MAX_HEADER_LINES = 64
 
 
-def read_pcd(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
-    """The one cluster of a .pcd file; the NaN rows of an organised cloud are directions without a return."""
+def read_pcd(path: Path, max_bytes: int, id_names: Collection[str]) -> list[Cluster]:
+    """The cluster of a .pcd file, or one of each id.
+
+    NaN rows of an organised cloud are directions without a return.
+    """
     try:
         _check_size(path, max_bytes)
         cloud = PointCloud.from_path(path)
@@ -27,9 +32,13 @@ def read_pcd(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
         raise FileError(
             f"expected the {cloud.metadata.points} points that {path.name} promises, got {len(records)}"
         )
-    points = xyz_from_records(records, path.name)
-    organised = cloud.metadata.height > 1
-    return [points[np.isfinite(points).all(axis=1)] if organised else points]
+    clusters = clusters_from_records(records, id_names, path.name)
+    return [_returned(cluster) for cluster in clusters] if cloud.metadata.height > 1 else clusters
+
+
+def _returned(cluster: Cluster) -> Cluster:
+    points = cluster.points_level
+    return replace(cluster, points_level=points[np.isfinite(points).all(axis=1)])
 
 
 def _check_size(path: Path, max_bytes: int) -> None:

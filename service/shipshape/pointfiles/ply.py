@@ -1,21 +1,22 @@
 """Polygon files: the vertices are the points, whatever else the file holds."""
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float32
 from plyfile import PlyData
 
 from shipshape.errors import FileError
-from shipshape.pointfiles.columns import cause, listed, xyz_from_records
+from shipshape.pointfiles.clusters import Cluster
+from shipshape.pointfiles.columns import cause, clusters_from_records, listed
 
 _HEADER_BYTES = 64 * 2**10
 _ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\d+)\s*$", re.MULTILINE)
 
 
-def read_ply(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
-    """The vertices of an ascii or binary .ply file."""
+def read_ply(path: Path, max_bytes: int, id_names: Collection[str]) -> list[Cluster]:
+    """The vertices of an ascii or binary .ply file; a cluster of each id where they have ids."""
     _check_counts(path)
     try:
         elements = {element.name: element for element in PlyData.read(str(path)).elements}
@@ -23,7 +24,7 @@ def read_ply(path: Path, max_bytes: int) -> list[Float32[np.ndarray, "_ 3"]]:
         raise FileError(f"expected {path.name} to be a complete PLY file, got: {cause(error)}") from error
     if "vertex" not in elements:
         raise FileError(f"expected an element vertex in {path.name}, got {listed(list(elements))}")
-    return [xyz_from_records(np.asarray(elements["vertex"].data), path.name)]
+    return clusters_from_records(np.asarray(elements["vertex"].data), id_names, path.name)
 
 
 def _check_counts(path: Path) -> None:
