@@ -3,10 +3,12 @@
 The one place that knows how work is spread over a machine.
 """
 
+import ctypes
 import gc
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -19,6 +21,7 @@ from shipshape.errors import ShipshapeError
 
 Work = Callable[[Chunk], Part]
 AHEAD = 3  # chunks of each worker that are read before their turn; bounds memory
+PR_SET_PDEATHSIG = 1  # of linux/prctl.h
 
 _work: Work  # of a worker process
 
@@ -31,7 +34,7 @@ def fork_workers(work: Work, count: int) -> Executor:
     """
     gc.freeze()  # a collection in a worker would write to each page of what it shares
     context = multiprocessing.get_context("fork")
-    executor = ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(work,))
+    executor = ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(work, os.getpid()))
     executor.submit(os.getpid).result()  # the first task forks them all
     return executor
 
@@ -79,12 +82,18 @@ def _take(item: Future[Part] | Ending) -> Part | Ending:
     return item if isinstance(item, Ending) else item.result()
 
 
-def _begin(work: Work) -> None:
+def _begin(work: Work, parent: int) -> None:
     """In a worker: it leaves Ctrl-C to its parent, and does not outlive it."""
     global _work  # noqa: PLW0603  a worker gets its work when it is forked, a task can carry only its chunk
     _work = work
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    if sys.platform == "linux":
+        # By the kernel, so that a worker has one thread: with a second one each allocation takes locks.
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    else:
+        threading.Thread(target=_end_with_parent, daemon=True).start()
+    if os.getppid() != parent:
+        os._exit(1)
 
 
 def _end_with_parent() -> None:
