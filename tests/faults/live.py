@@ -8,6 +8,7 @@ import threading
 import time
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import grpc
 import httpx
@@ -127,6 +128,14 @@ class Live:
             sum(each.memory_info().rss for each in family) / 2**20,
         )
 
+    def most_mb(self):
+        """Resident memory at its highest since `forget_most`."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(re.search(r"VmHWM:\s+(\d+) kB", status)[1]) / 2**10
+
+    def forget_most(self):
+        Path(f"/proc/{self.process.pid}/clear_refs").write_text("5")
+
     def internal_errors(self):
         return [line for line in self.log if "internal error" in line or '"level": "error"' in line]
 
@@ -184,8 +193,10 @@ class Live:
         slots = status["contacts"]["pending"], status["queue_depth"], status["running"]
         return slots == (0, 0, 0) and self.metric("shipshape_in_flight") == 0
 
-    def fill_pools(self):
-        """Pools start their threads when they are needed first, and keep them: that is no leak."""
+    def warm_up(self):
+        """Threads of pools and the process for large JSON are started when they are needed first: that is no leak."""
+        large = {"points": rows(cluster(20_000))}
+        assert self.rest.post("/v1/recognise", json=large).status_code == 200
         threads, calm = 0, 0
         while calm < CALM:
             calls = [self.stub.Recognise.future(request(POINTS, contact_id="slow")) for _ in range(BURST)]
@@ -223,7 +234,7 @@ def live(folder, command=("-c", FAULTY), **settings):
         ]
         channel = stack.enter_context(grpc.insecure_channel(f"127.0.0.1:{rpc}"))
         service = Live(process, *clients, channel, rpc, log)
-        service.fill_pools()
+        service.warm_up()
         service.answers_good_requests()
         yield service
         process.kill()
@@ -234,7 +245,9 @@ def _ports(process, log):
     for line in process.stderr:
         log.append(line)
         if (message := json.loads(line)["message"]).startswith("ready: "):
-            found = re.search(r"REST http://\S+?:(\d+), gRPC \S+?:(\d+), health port (\d+), admin port (\d+)", message)
+            found = re.search(
+                r"REST http://\S+?:(\d+), gRPC \S+?:(\d+), health port (\d+), admin port (\d+)", message
+            )
             return [int(port) for port in found.groups()]
     pytest.fail(f"it ended with {process.wait(PATIENCE)} before it was ready: {log[-3:]}")
 

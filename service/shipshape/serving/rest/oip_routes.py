@@ -18,7 +18,7 @@ from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import Inference, submit
 from shipshape.serving.rest.bodies import Bodies
-from shipshape.serving.rest.headers import media_type, timeout_s
+from shipshape.serving.rest.headers import check_encoding, media_type, timeout_s
 from shipshape.serving.rest.oip_bodies import JSON_BYTES_HEADER, Asked, parse_infer, write_answer
 from shipshape.serving.rest.problems import ID_HEADER, STATUS, identify, retry_headers
 from shipshape.serving.rest.requests import JSON, PACKED
@@ -153,11 +153,9 @@ def _check_verb(request: Request, verb: str) -> None:
 
 
 def _check_form(request: Request) -> None:
+    check_encoding(request)
     if "content-type" in request.headers:  # Triton's client names none
         media_type(request, JSON, PACKED)
-    encoding = request.headers.get("content-encoding", "identity")
-    if encoding != "identity":
-        raise HTTPException(415, f"expected a body without content encoding, got {encoding:.40}")
 
 
 def _refused(error: Exception) -> tuple[FaultKind, Response]:
