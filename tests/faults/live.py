@@ -28,7 +28,8 @@ PATIENCE = 60.0
 LOOK_S = 0.02  # between two looks whether something has come true
 TOKEN = "the operator's"
 PACKED = {"content-type": "application/octet-stream"}
-POINTS = cluster()
+POINTS, HEIGHT_M = cluster(), 3.0
+PORTS = re.compile(r"REST http://\S+?:(\d+), gRPC \S+?:(\d+), health port (\d+), admin port (\d+)")
 BURST, CALM = 96, 3  # calls at a time; bursts after which no more threads are started
 THREADS = 24  # that pools of libraries may start late
 ROOM_MB = 100.0  # that allocators may keep
@@ -149,19 +150,19 @@ class Live:
 
     def answers_good_requests(self):
         """One through every door, in every form of request."""
-        contact = pb.Contact(points=POINTS.tobytes(), sensor_height_m=3.0)
-        assert self.ask_rest(sensor_height_m=3.0).status_code == 200
-        body = {"points": rows(POINTS), "sensor_height_m": 3.0}
+        contact = pb.Contact(points=POINTS.tobytes(), sensor_height_m=HEIGHT_M)
+        assert self.ask_rest(sensor_height_m=HEIGHT_M).status_code == 200
+        body = {"points": rows(POINTS), "sensor_height_m": HEIGHT_M}
         assert self.rest.post("/v1/recognise", json=body).status_code == 200
         assert self.rest.post("/v1/scan", json={"contacts": [body]}).json()["results"][0]["recognition"]
-        assert self.ask_grpc(sensor_height_m=3.0).recognition.vessel
+        assert self.ask_grpc(sensor_height_m=HEIGHT_M).recognition.vessel
         scan = self.stub.RecogniseScan(pb.RecogniseScanRequest(contacts=[contact] * 2), timeout=PATIENCE)
         assert all(result.recognition.vessel for result in scan.results)
         messages = iter([pb.RecogniseStreamRequest(sequence=1, contacts=[contact])])
         (answer,) = self.stub.RecogniseStream(messages, timeout=PATIENCE)
         assert answer.results[0].recognition.vessel
         for infer in (by_json, by_grpc_raw):
-            assert infer(self, {"points": POINTS, "sensor_height_m": np.array([3.0])}).outputs["vessel"]
+            assert infer(self, {"points": POINTS, "sensor_height_m": np.array([HEIGHT_M])}).outputs["vessel"]
 
     @contextmanager
     def survives(self, *, internal=0, grows_mb=ROOM_MB):
@@ -194,12 +195,13 @@ class Live:
         return slots == (0, 0, 0) and self.metric("shipshape_in_flight") == 0
 
     def warm_up(self):
-        """Threads of pools and the process for large JSON are started when they are needed first: that is no leak."""
-        large = {"points": rows(cluster(20_000))}
+        """Let it start what it starts when it is first needed: threads of pools, the process for large JSON."""
+        large = {"points": rows(cluster(20_000)), "sensor_height_m": HEIGHT_M}
         assert self.rest.post("/v1/recognise", json=large).status_code == 200
         threads, calm = 0, 0
         while calm < CALM:
-            calls = [self.stub.Recognise.future(request(POINTS, contact_id="slow")) for _ in range(BURST)]
+            slow = request(POINTS, contact_id="slow", sensor_height_m=HEIGHT_M)
+            calls = [self.stub.Recognise.future(slow) for _ in range(BURST)]
             for call in calls:
                 call.exception(PATIENCE)
             now = self.footprint().threads

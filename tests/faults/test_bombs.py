@@ -113,7 +113,7 @@ def test_json_that_is_many_times_larger_in_memory_stays_out_of_the_service(servi
 
 
 @pytest.mark.xfail(
-    strict=True, reason="the OIP door parses large JSON in the service itself, some 20 times its size"
+    strict=True, reason="the OIP door parses large JSON in the service itself"
 )
 def test_the_same_over_oip(service):
     service.forget_most()

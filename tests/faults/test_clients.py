@@ -56,7 +56,7 @@ contact = pb.Contact(contact_id="slow", points=points)
 stub = shipshape_pb2_grpc.ShipshapeStub(grpc.insecure_channel(rpc))
 answered = threading.Barrier(5, action=lambda: print("asking", flush=True))
 host, port = rest.split(":")
-head = f"POST /v1/recognise?contact_id=slow HTTP/1.1\\r\\nHost: x\\r\\nContent-Type: application/octet-stream\\r\\n"
+head = "POST /v1/recognise?contact_id=slow HTTP/1.1\\r\\nHost: x\\r\\nContent-Type: application/octet-stream\\r\\n"
 def halves():
     with socket.create_connection((host, int(port))) as client:
         client.sendall(f"{head}Content-Length: {len(points)}\\r\\n\\r\\n".encode() + points[: len(points) // 2])
