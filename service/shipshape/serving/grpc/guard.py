@@ -1,13 +1,15 @@
 """What every RPC of our services passes: limits, parsing, metrics, request id, and the one table of errors."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import closing
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NoReturn
 
 import grpc
-from google.protobuf.message import DecodeError
+from google.protobuf.message import DecodeError, EncodeError
 
 from shipshape.errors import InvalidInput
 from shipshape.serving.access import Access
@@ -32,7 +34,9 @@ STATUS = {
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
-StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Iterator[Any]]
+Parse = Callable[[bytes], Any]
+Write = Callable[[Any], bytes]
+StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Generator[Any, None, None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,18 +88,14 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         if handler is None or service != self._of.service:
             return handler
         method = self._of.methods[name]
-        # No deserializer: gRPC would answer INTERNAL to bytes that do not parse, and that is not our fault.
+        # Neither deserializer nor serializer: gRPC would answer INTERNAL to bytes that do not parse, which is not
+        # our fault, and to an answer for which memory is short, without a word in the metrics.
+        parse, write = handler.request_deserializer, partial(_written, handler.response_serializer)
         if handler.request_streaming:
-            return grpc.stream_stream_rpc_method_handler(
-                self._guarded_stream(handler.stream_stream, handler.request_deserializer),
-                response_serializer=handler.response_serializer,
-            )
-        return grpc.unary_unary_rpc_method_handler(
-            self._guarded(handler.unary_unary, handler.request_deserializer, method),
-            response_serializer=handler.response_serializer,
-        )
+            return grpc.stream_stream_rpc_method_handler(self._guarded_stream(handler.stream_stream, parse, write))
+        return grpc.unary_unary_rpc_method_handler(self._guarded(handler.unary_unary, parse, write, method))
 
-    def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
+    def _guarded(self, behaviour: Behaviour, parse: Parse, write: Write, method: str) -> Behaviour:
         def call(raw: bytes, context: grpc.ServicerContext) -> Any:
             """One call: its id, its time, its share, and its refusal in our words."""
             identify(context)
@@ -110,6 +110,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                         current_call.set(Call(outcome, share))
                         share.take(min(outcome.contacts, self._limits.max_contacts))
                         response = behaviour(message, context)
+                        written = write(response)
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
@@ -117,17 +118,18 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     refuse(context, fault, grpc.StatusCode.NOT_FOUND if unknown else None)
                 if method == SINGLE and response.recognition.rung != Rung.FULL:
                     outcome.kind = DEGRADED
-                return response
+                return written
 
         return call
 
-    def _guarded_stream(self, behaviour: StreamBehaviour, parse: Callable[[bytes], Any]) -> StreamBehaviour:
-        def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Iterator[Any]:
+    def _guarded_stream(self, behaviour: StreamBehaviour, parse: Parse, write: Write) -> StreamBehaviour:
+        def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Generator[Any, None, None]:
             """One stream; what its messages get wrong is their own answers' matter."""
             identify(context)
             set_trailing(context)
             try:
-                yield from behaviour(self._messages(raws, parse), context)
+                with closing(behaviour(self._messages(raws, parse), context)) as answers:
+                    yield from map(write, answers)
             except Exception as error:  # a message that is wrong is answered and counted in the stream
                 fault = fault_of(error)
                 with self._metrics.request(self._of.door, STREAM) as outcome:
@@ -136,7 +138,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 
         return call
 
-    def _messages(self, raws: Iterator[bytes], parse: Callable[[bytes], Any]) -> Iterator[Any]:
+    def _messages(self, raws: Iterator[bytes], parse: Parse) -> Iterator[Any]:
         for raw in raws:
             check_body(len(raw), self._limits)
             yield _parsed(raw, parse, self._of.service)
@@ -164,10 +166,17 @@ def refuse(context: grpc.ServicerContext, fault: Fault, status: grpc.StatusCode 
     raise AssertionError("unreachable: abort raises")
 
 
-def _parsed(raw: bytes, parse: Callable[[bytes], Any], service: str) -> Any:
+def _parsed(raw: bytes, parse: Parse, service: str) -> Any:
     try:
         return parse(raw)
     except DecodeError as error:
         raise InvalidInput(
             f"expected a message of {service.rpartition('.')[0]}, got {len(raw)} bytes that do not parse as one"
         ) from error
+
+
+def _written(serialise: Write, response: Any) -> bytes:
+    try:
+        return serialise(response)
+    except EncodeError as error:  # all that protobuf says when memory is short, or an answer over its 2 GiB
+        raise MemoryError("no memory to write the answer") from error

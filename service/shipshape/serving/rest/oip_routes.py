@@ -153,7 +153,7 @@ def _check_verb(request: Request, verb: str) -> None:
 
 
 def _check_form(request: Request) -> None:
-    check_encoding(request)
+    check_encoding(request.headers.get("content-encoding"))
     if "content-type" in request.headers:  # Triton's client names none
         media_type(request, JSON, PACKED)
 
