@@ -29,28 +29,29 @@ LOOK_S = 0.02  # between two looks whether something has come true
 TOKEN = "the operator's"
 PACKED = {"content-type": "application/octet-stream"}
 POINTS, HEIGHT_M = cluster(), 3.0
+WORKERS, MAX_CONTACTS, QUEUE_LIMIT = 2, 64, 128
 PORTS = re.compile(r"REST http://\S+?:(\d+), gRPC \S+?:(\d+), health port (\d+), admin port (\d+)")
-BURST, CALM = 96, 3  # calls at a time; bursts after which no more threads are started
+BURST, CALM = 200, 2  # calls at a time; bursts after which no more threads are started
 THREADS = 24  # that pools of libraries may start late
 ROOM_MB = 100.0  # that allocators may keep
 # Contact ids that mean something, beside those of the fake pipeline. What they do is seen from every process.
 FAULTY = (
     """
-import os, time
+import os, threading
 from pathlib import Path
 import numpy as np
 from serving.fakes import FakePipeline
-as_usual = FakePipeline._prior
+as_usual, pause = FakePipeline._prior, threading.Event().wait  # time.sleep fails where the clock is faked
 def prior(self, work):
     if work.contact.contact_id == "wedge":
         for _ in range(1000):
             if Path(os.environ["RELEASE"]).exists():
                 return
-            time.sleep(0.01)
+            pause(0.01)
     if work.contact.contact_id == "memory":
         np.zeros(1 << 50)
     if work.contact.contact_id == "slow":
-        time.sleep(0.02)
+        pause(0.02)
     as_usual(self, work)
 FakePipeline._prior = prior
 """
@@ -98,6 +99,7 @@ class Live:
     health: httpx.Client
     channel: grpc.Channel
     grpc_port: int
+    release: Path  # a file: it sets stages free that are stuck, as long as it is there
     log: list = field(default_factory=list)
 
     @property
@@ -218,19 +220,20 @@ class Live:
 
 
 @contextmanager
-def live(folder, command=("-c", FAULTY), **settings):
-    """A service that is ready; `settings` are its variables, and it ends with the block."""
+def live(folder, command=("-c", FAULTY), more=None, **settings):
+    """A service that is ready until the end of the block, with these settings and `more` variables."""
     (folder / "tokens").write_text(f"ops {hashlib.sha256(TOKEN.encode()).hexdigest()}\n")
     variables = {
         "ADMIN_PORT": "0",
         "ADMIN_TOKEN_FILE": str(folder / "tokens"),
         "HEALTH_PORT": "0",
-        "MAX_CONTACTS": "16",
-        "QUEUE_LIMIT": "32",
+        "WORKERS": str(WORKERS),
+        "MAX_CONTACTS": str(MAX_CONTACTS),
+        "QUEUE_LIMIT": str(QUEUE_LIMIT),
         "DEFAULT_TIMEOUT_MS": str(PATIENCE * 1e3),
         **settings,
     }
-    environment = {f"SHIPSHAPE_{name}": value for name, value in variables.items() if name.isupper()}
+    environment = {f"SHIPSHAPE_{name}": value for name, value in variables.items()} | (more or {})
     with start(*command, RELEASE=str(folder / "release"), **environment) as process, ExitStack() as stack:
         stack.callback(process.kill)
         log = []
@@ -243,7 +246,7 @@ def live(folder, command=("-c", FAULTY), **settings):
             for port, headers in ((rest, {}), (admin, {"Authorization": f"Bearer {TOKEN}"}), (health, {}))
         ]
         channel = stack.enter_context(grpc.insecure_channel(f"127.0.0.1:{rpc}"))
-        service = Live(process, *clients, channel, rpc, log)
+        service = Live(process, *clients, channel, rpc, folder / "release", log)
         service.warm_up()
         service.answers_good_requests()
         yield service

@@ -4,33 +4,22 @@ import threading
 from contextlib import contextmanager, suppress
 
 import grpc
-import pytest
 from grpc_health.v1 import health_pb2
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
-from faults.live import PATIENCE, POINTS, eventually, live
+from faults.live import PATIENCE, POINTS, WORKERS, eventually
 from serving.fakes import request
 from shipshape.v1 import shipshape_pb2 as pb
 
-WORKERS = 2
 SERVING, NOT_SERVING = health_pb2.HealthCheckResponse.SERVING, health_pb2.HealthCheckResponse.NOT_SERVING
-SOON_S = 0.5
+SOON_S = 1.0
 # Where a stuck worker can be set free it gives its answer; where it is a process, it may be ended instead.
 ENDS = (grpc.StatusCode.OK, grpc.StatusCode.UNAVAILABLE)
 
 
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """A service, and the file that sets its stuck workers free."""
-    folder = tmp_path_factory.mktemp("wedge")
-    with live(folder, WORKERS=str(WORKERS)) as service:
-        yield service, folder / "release"
-
-
 @contextmanager
-def stuck(alone, workers):
+def stuck(service, workers):
     """So many workers are stuck until the end of the block; it begins when the service says so."""
-    service, release = alone
     told = []
     watch = HealthStub(service.channel).Watch(health_pb2.HealthCheckRequest())
     threading.Thread(target=_note, args=(watch, told), daemon=True).start()
@@ -40,16 +29,16 @@ def stuck(alone, workers):
     calls = [service.stub.Recognise.future(wedge, timeout=PATIENCE) for _ in range(workers)]
     eventually(lambda: NOT_SERVING in told or not service.ready())
     try:
-        yield service
-        release.touch()
+        yield
+        service.release.touch()
         for call in calls:
             call.exception(PATIENCE)
             assert call.code() in ENDS
         eventually(service.ready)
     finally:
-        release.touch()
+        service.release.touch()
         watch.cancel()
-    release.unlink()
+    service.release.unlink()
 
 
 def _note(watch, told):
@@ -57,11 +46,11 @@ def _note(watch, told):
         told.extend(answer.status for answer in watch)
 
 
-def test_deadlines_hold_while_all_workers_are_stuck_and_what_waits_is_answered_after(alone):
+def test_deadlines_hold_while_all_workers_are_stuck_and_what_waits_is_answered_after(service):
     contact = pb.Contact(contact_id="late", points=POINTS.tobytes())
     message = pb.RecogniseStreamRequest(sequence=1, contacts=[contact], timeout_ms=SOON_S * 1e3)
-    with alone[0].survives(internal=None):
-        with stuck(alone, WORKERS) as service:
+    with service.survives(internal=None):
+        with stuck(service, WORKERS):
             waiting = service.stub.Recognise.future(request(POINTS, contact_id="waiting"), timeout=PATIENCE)
             unary = service.stub.Recognise.future(pb.RecogniseRequest(contact=contact), timeout=SOON_S)
             streamed = service.stub.RecogniseStream(iter([message]), timeout=PATIENCE)
@@ -73,8 +62,8 @@ def test_deadlines_hold_while_all_workers_are_stuck_and_what_waits_is_answered_a
         assert waiting.result().recognition.contact_id == "waiting"
 
 
-def test_the_other_worker_goes_on_while_one_is_stuck(alone):
-    with alone[0].survives(internal=None), stuck(alone, 1) as service:
+def test_the_other_worker_goes_on_while_one_is_stuck(service):
+    with service.survives(internal=None), stuck(service, 1):
         assert service.health.get("/livez").status_code == 200
         for _ in range(20):
             assert service.ask_rest().status_code == 200
