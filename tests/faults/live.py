@@ -42,7 +42,15 @@ from pathlib import Path
 import numpy as np
 from serving.fakes import FakePipeline
 as_usual, pause = FakePipeline._prior, threading.Event().wait  # time.sleep fails where the clock is faked
+journal = os.open(os.environ["JOURNAL"], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+as_made = FakePipeline.__init__
+def made(self):
+    as_made(self)
+    object.__setattr__(self.stages[-1], "run", lambda work: noted(work, self.stages[-1].name))
+def noted(work, stage):
+    os.write(journal, f"{work.contact.contact_id} {stage}\\n".encode())
 def prior(self, work):
+    noted(work, self.stages[0].name)
     if work.contact.contact_id == "wedge":
         for _ in range(1000):
             if Path(os.environ["RELEASE"]).exists():
@@ -53,7 +61,7 @@ def prior(self, work):
     if work.contact.contact_id == "slow":
         pause(0.02)
     as_usual(self, work)
-FakePipeline._prior = prior
+FakePipeline.__init__, FakePipeline._prior = made, prior
 """
     + SERVE_FAKES
 )
@@ -220,8 +228,11 @@ class Live:
 
 
 @contextmanager
-def live(folder, command=("-c", FAULTY), more=None, **settings):
-    """A service that is ready until the end of the block, with these settings and `more` variables."""
+def live(folder, command=("-c", FAULTY), more=None, warm=True, **settings):
+    """A service that is ready until the end of the block, with these settings and `more` variables.
+
+    It notes in the file `journal` of the folder which stage of which contact begins.
+    """
     (folder / "tokens").write_text(f"ops {hashlib.sha256(TOKEN.encode()).hexdigest()}\n")
     variables = {
         "ADMIN_PORT": "0",
@@ -234,21 +245,23 @@ def live(folder, command=("-c", FAULTY), more=None, **settings):
         **settings,
     }
     environment = {f"SHIPSHAPE_{name}": value for name, value in variables.items()} | (more or {})
-    with start(*command, RELEASE=str(folder / "release"), **environment) as process, ExitStack() as stack:
+    files = {"RELEASE": str(folder / "release"), "JOURNAL": str(folder / "journal")}
+    with start(*command, **files, **environment) as process, ExitStack() as stack:
         stack.callback(process.kill)
         log = []
         rest, rpc, health, admin = _ports(process, log)
         reading = threading.Thread(target=lambda: log.extend(iter(process.stderr.readline, "")), daemon=True)
         reading.start()
-        options = {"timeout": PATIENCE, "trust_env": False}
+        options = {"timeout": PATIENCE, "trust_env": False, "limits": httpx.Limits(max_keepalive_connections=1)}
         clients = [
             stack.enter_context(httpx.Client(base_url=f"http://127.0.0.1:{port}", headers=headers, **options))
             for port, headers in ((rest, {}), (admin, {"Authorization": f"Bearer {TOKEN}"}), (health, {}))
         ]
         channel = stack.enter_context(grpc.insecure_channel(f"127.0.0.1:{rpc}"))
         service = Live(process, *clients, channel, rpc, folder / "release", log)
-        service.warm_up()
-        service.answers_good_requests()
+        if warm:
+            service.warm_up()
+            service.answers_good_requests()
         yield service
         process.kill()
         reading.join(PATIENCE)

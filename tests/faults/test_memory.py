@@ -73,7 +73,7 @@ def test_the_largest_scan_without_the_memory_for_its_answer(service, spare_mb):
 def test_the_same_over_rest(tmp_path):
     wishes = dict.fromkeys(("include_restored", "include_images", "include_png"), "true")
     query = {"counts": ",".join([str(len(LARGE))] * MAX_CONTACTS), **wishes}
-    with live(tmp_path) as service:
+    with live(tmp_path, warm=False) as service:
         with short_of_memory(service, SPARE_MB[-1]):
             try:
                 answer = service.rest.post(

@@ -1,4 +1,4 @@
-"""The REST door against its own contract, by schemathesis: whatever is sent, it answers as openapi.json promises."""
+"""The REST door against its own contract: whatever schemathesis sends, it answers as openapi.json promises."""
 
 import pytest
 import requests
