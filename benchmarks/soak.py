@@ -36,6 +36,8 @@ from benchmarks.serving.wires import Wire
 
 SETTLING = 0.2  # share of the run after which allocators and pools have what they need: not counted
 CONFIDENCE = 0.95
+TRIFLE_MB = 1.0  # an hour: where nothing else moves, a few new pages would be growth beyond doubt
+SPAN_MB = 10.0  # that the picture shows at least
 IDLE_S, FEW_FILES = 2.0, 2  # until connections are closed, and more open files than before that are no leak
 CAPACITY_S, SPELL_S = 10.0, 60.0  # of the measurement of the capacity, and of one order to the load generator
 
@@ -51,7 +53,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """Growth an hour, and the interval in which it lies with 95 %."""
+    """Growth an hour, MB, and the interval in which it lies with 95 %."""
 
     an_hour: float
     low: float
@@ -59,11 +61,11 @@ class Slope:
 
     @property
     def grows(self) -> bool:
-        """Whether chance alone would hardly show so much."""
-        return self.low > 0
+        """Whether there is more than a trifle, and chance alone would hardly show so much."""
+        return self.low > TRIFLE_MB
 
     def __str__(self) -> str:
-        return f"{self.an_hour:+.2f} an hour (95 %: {self.low:+.2f} to {self.high:+.2f})"
+        return f"{self.an_hour:+.2f} MB an hour (95 %: {self.low:+.2f} to {self.high:+.2f})"
 
 
 def main() -> int:
@@ -160,7 +162,7 @@ def _report(samples: list[Sample], loads: list[Load], left_open: int, args: argp
     args.out.with_suffix(".json").write_text(json.dumps(found, indent=1) + "\n")
     _draw(samples, memory, args.out.with_suffix(".png"))
     print(f"{statuses.total()} requests at {found['rate']:.0f} a second, {errors} failed: {dict(statuses)}")
-    print(f"resident memory: {counted[-1].rss_mb:.1f} MB, {memory} MB")
+    print(f"resident memory: {counted[-1].rss_mb:.1f} MB, {memory}")
     print(f"files left open: {left_open}")
     return int(memory.grows or left_open > FEW_FILES or errors > 0)
 
@@ -170,8 +172,11 @@ def _draw(samples: list[Sample], memory: Slope, path: Path) -> None:
     figure = Figure(figsize=(8, 5), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     above.plot(minutes, [sample.rss_mb for sample in samples], color="#0b6e99")
+    low, high = above.get_ylim()
+    spare = max(0.0, SPAN_MB - (high - low)) / 2
+    above.set_ylim(low - spare, high + spare)
     above.axvspan(0, SETTLING * minutes[-1], color="#eeeeee", zorder=0)
-    above.set(ylabel="resident, MB", title=f"{memory} MB; the grey part is not counted")
+    above.set(ylabel="resident, MB", title=f"{memory}; the grey part is not counted")
     below.plot(minutes, [sample.descriptors for sample in samples], color="#444444", drawstyle="steps-post")
     below.set(xlabel="minutes", ylabel="open files")
     for axes in (above, below):

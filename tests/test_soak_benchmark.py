@@ -32,3 +32,9 @@ def test_noise_alone_is_rarely_called_growth(alike):
 def test_memory_that_never_moves_does_not_grow():
     found = slope_of(SECONDS, np.full(len(SECONDS), 300.0))
     assert (found.an_hour, found.grows) == (0, False)
+
+
+def test_a_few_new_pages_are_no_growth():
+    found = slope_of(SECONDS, 300 + 0.004 * np.floor(SECONDS / 120))
+    assert found.low > 0
+    assert not found.grows
