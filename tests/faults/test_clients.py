@@ -1,12 +1,14 @@
 """Clients that are slow, that say nothing, and that are killed: whoever else asks does not notice."""
 
 import random
+import resource
 import signal
 import socket
 import subprocess
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 
+import httpx
 import pytest
 
 from faults.live import POINTS, eventually, without_proxies
@@ -44,6 +46,36 @@ def test_a_thousand_slow_clients_hold_up_nobody(service):
         assert service.ready()
         assert service.metric("shipshape_in_flight") == SLOW, "the bodies that are on their way"
         assert service.footprint().rss_mb - before < 0.1 * len(clients)
+
+
+@contextmanager
+def few_files(service, more):
+    """The service can open only so many more files and connections, until the end of the block."""
+    pid = service.process.pid
+    before, most = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+    held = service.footprint().descriptors
+    resource.prlimit(pid, resource.RLIMIT_NOFILE, (held + more, most))
+    try:
+        yield
+    finally:
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (before, most))
+
+
+def test_more_clients_than_the_service_may_have_files(service):
+    with service.survives(internal=None), few_files(service, more=20):
+        with ExitStack() as connections:
+            for address in (service.rest_address, service.grpc_address):
+                for _ in range(60):
+                    connections.enter_context(socket.create_connection(address)).sendall(b"P")
+            assert service.ask_grpc().recognition.vessel, "over a connection that was there before"
+        eventually(lambda: answers(service))
+
+
+def answers(service):
+    try:
+        return service.ask_rest().status_code == 200
+    except httpx.TransportError:
+        return False
 
 
 # Asks through every door in turn, without an end; the last request is one of which half is never sent.
