@@ -39,13 +39,13 @@ async def measure(process: JsonProcess) -> None:
     loop = asyncio.get_running_loop()
 
     async def on_loop(body: bytes) -> None:
-        parse_json(body, {}, LIMITS)
+        parse_json(body, "", LIMITS)
 
     async def in_thread(body: bytes) -> None:
-        await loop.run_in_executor(None, functools.partial(parse_json, body, {}, LIMITS))
+        await loop.run_in_executor(None, functools.partial(parse_json, body, "", LIMITS))
 
     async def in_process(body: bytes) -> None:
-        await process.parse(parse_json, body, {}, TIMEOUT_S)
+        await process.parse(parse_json, body, "", TIMEOUT_S)
 
     ways = {"nothing": idle, "on the loop": on_loop, "in a thread": in_thread, "in a process": in_process}
     await in_process(body_of(10))  # its start is not the question

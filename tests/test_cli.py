@@ -1,5 +1,7 @@
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -11,8 +13,8 @@ import pytest
 from builders_onnx import write_tiny_bundle
 from builders_pipeline import FakePipeline, fake_bundle
 from builders_recognition import side_of_hull, write_scan
-from shipshape import commands
-from shipshape.cli import main
+from shipshape import commands, serve
+from shipshape.cli import build_parser, main
 from shipshape.pointfiles import SUFFIXES
 from shipshape.sample import sample_contact
 from shipshape.types import ImageMethod, Preset
@@ -150,6 +152,7 @@ def test_a_wrong_command_line_exits_with_2(argv, capsys):
     with pytest.raises(SystemExit) as caught:
         main(argv)
     assert caught.value.code == 2
+    assert re.search(r"; see `shipshape.* --help`$", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +163,23 @@ def test_every_command_has_help(argv, capsys):
         main(argv)
     assert caught.value.code == 0
     shown = capsys.readouterr().out
-    assert "example" in shown or len(argv) == 1
+    assert "example" in shown or argv == ["--version"]
+
+
+def test_every_example_in_a_help_text_is_a_command_that_parses():
+    for parser in parsers(build_parser()):
+        lines = re.findall(r"^  shipshape (.+)$", parser.epilog, re.M)
+        assert lines, parser.prog
+        for line in lines:
+            build_parser().parse_args(shlex.split(line.partition(" | ")[0], comments=True))
+
+
+def parsers(parser):
+    """A parser and those of all its commands."""
+    yield parser
+    for action in parser._actions:
+        for child in action.choices.values() if isinstance(action.choices, dict) else ():
+            yield from parsers(child)
 
 
 def test_check_prints_bundle_answer_and_stages(pipeline, capsys):
@@ -210,13 +229,13 @@ def test_a_missing_bundle_exits_with_2_and_one_sentence(command, tmp_path, capsy
 
 def test_serve_hands_its_options_to_the_service(monkeypatch, tmp_path):
     seen = []
-    monkeypatch.setattr(commands, "serve_until_signal", lambda settings: seen.append(settings) or 0)
+    monkeypatch.setattr(serve, "serve_until_signal", lambda settings: seen.append(settings) or 0)
     assert main(["serve", "--rest-port", "0", "--grpc-port", "0", "--bundle", str(tmp_path)]) == 0
     assert (seen[0].rest_port, seen[0].grpc_port, seen[0].bundle) == (0, 0, tmp_path)
 
 
 def test_a_setting_that_cannot_work_exits_with_2(monkeypatch, capsys):
-    monkeypatch.setattr(commands, "serve_until_signal", lambda settings: 0)
+    monkeypatch.setattr(serve, "serve_until_signal", lambda settings: 0)
     assert main(["serve", "--rest-port", "99999"]) == 2
     assert "SHIPSHAPE_REST_PORT, got 99999" in capsys.readouterr().err
 

@@ -108,6 +108,9 @@ def test_step_by_step_gives_the_same_answer(options: Options) -> None:
     assert (stepwise.heading, stepwise.box) == (whole.heading, whole.box)
     np.testing.assert_array_equal(stepwise.restored.points_level, whole.restored.points_level)
     np.testing.assert_array_equal(stepwise.images.after, whole.images.after)
+    np.testing.assert_array_equal(stepwise.descriptors, whole.descriptors)
+    np.testing.assert_allclose(whole.descriptors / 255, work.images, atol=0.5 / 255 + 1e-6)
+    assert whole.descriptors.any()
 
 
 @EACH_WAY

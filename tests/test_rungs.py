@@ -34,6 +34,7 @@ def test_a_lower_rung_says_all_but_what_is_restored(rung: Rung) -> None:
     assert said.box.size.length > 0.0
     assert (said.rung, said.rung_reason) == (rung, "time was short")
     assert said.images is None
+    assert len(said.descriptors) == 0
     assert len(said.keypoints_level) == said.inferred_points == 0
     np.testing.assert_array_equal(said.restored.points_level, cluster().points_level)
     assert "occluded" not in said.reasons

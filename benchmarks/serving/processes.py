@@ -62,8 +62,8 @@ def cpu_s(process: psutil.Process) -> float:
 
 
 def rss_mb(process: psutil.Process) -> float:
-    """Resident megabytes of the process and all its descendants; shared pages count once a process."""
-    return sum(member.memory_info().rss for member in _family(process)) / 1e6
+    """Resident megabytes of the process and all its descendants; a page that several share counts once in all."""
+    return sum(member.memory_full_info().pss for member in _family(process)) / 1e6
 
 
 def free_ports() -> int:

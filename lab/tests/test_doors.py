@@ -16,8 +16,7 @@ import pytest
 
 from shipshape.bundle import load_bundle
 from shipshape.pipeline import Pipeline
-from shipshape.render import render_png
-from shipshape.serving.core import Model
+from shipshape.serving.prepare import load_local
 from shipshape.serving.service import Addresses, Service
 from shipshape.settings import Settings
 from shipshape.types import Contact
@@ -48,14 +47,13 @@ class Doors:
 
 
 def _load(folder):
-    bundle = load_bundle(folder)
-    return Model(bundle, Pipeline(bundle))
+    return load_local(folder, 65_536)
 
 
 @pytest.fixture(scope="module")
 def doors():
     settings = Settings(rest_port=0, grpc_port=0, workers=1, default_timeout_ms=PATIENCE * 1e3)
-    service = Service(settings, render_png, load=_load, on_death=lambda: pytest.fail("a door died"))
+    service = Service(settings, 1, load=_load, on_death=lambda: pytest.fail("a door died"))
     with ExitStack() as stack:
         stack.callback(service.stop)
         addresses = service.start()

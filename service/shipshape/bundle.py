@@ -24,6 +24,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from shipshape.errors import BundleError
 from shipshape.onnx_model import OnnxModel, Signature, TensorSpec
+from shipshape.providers import PROCESSOR, Runtime
 from shipshape.types import ImageMethod, ReferenceBox
 
 MANIFEST = "manifest.toml"
@@ -52,19 +53,33 @@ class Bundle:
     training: Mapping[str, Any]
 
 
-def load_bundle(path: Path) -> Bundle:
+def load_bundle(path: Path, runtime: Runtime = PROCESSOR) -> Bundle:
     """The bundle in the folder `path`, every file compared with its sha256 before it is parsed.
+
+    Args:
+        path: The folder.
+        runtime: Where its networks run.
 
     Raises:
         BundleError: One sentence that says what was expected and what came.
     """
     content = _read_manifest(path)
     spec = _parse_manifest(content)
+    return _bundle(content, spec, {name: _load_model(path, model, runtime) for name, model in spec.models.items()})
+
+
+def read_bundle(path: Path) -> Bundle:
+    """The same without its networks, which are not looked at; raises BundleError for the manifest alone."""
+    content = _read_manifest(path)
+    return _bundle(content, _parse_manifest(content), {})
+
+
+def _bundle(content: bytes, spec: "_ManifestSpec", models: Mapping[str, OnnxModel]) -> Bundle:
     return Bundle(
         name=spec.name,
         digest=hashlib.sha256(content).hexdigest(),
         catalogue=tuple(vessel.to_vessel() for vessel in spec.catalogue),
-        models=_Table("models", {name: _load_model(path, model) for name, model in spec.models.items()}),
+        models=_Table("models", models),
         parameters=_Table("parameters", spec.parameters),
         scores=spec.scores,
         training=spec.training,
@@ -210,7 +225,8 @@ class _ManifestSpec(_Spec):
 def _read_manifest(folder: Path) -> bytes:
     if not folder.is_dir():
         raise BundleError(
-            f"expected a bundle folder at {folder}, got {'a file' if folder.exists() else 'nothing'}"
+            f"expected a bundle folder at {folder}, got {'a file' if folder.exists() else 'nothing'}: "
+            "--bundle or SHIPSHAPE_BUNDLE names another"
         )
     try:
         return (folder / MANIFEST).read_bytes()
@@ -249,7 +265,7 @@ def _check_names(names: list[str]) -> None:
         )
 
 
-def _load_model(folder: Path, entry: _ModelEntry) -> OnnxModel:
+def _load_model(folder: Path, entry: _ModelEntry, runtime: Runtime) -> OnnxModel:
     try:
         content = (folder / entry.file).read_bytes()
     except OSError as error:
@@ -257,4 +273,4 @@ def _load_model(folder: Path, entry: _ModelEntry) -> OnnxModel:
     digest = hashlib.sha256(content).hexdigest()
     if digest != entry.sha256:
         raise BundleError(f"expected sha256 {entry.sha256} of {entry.file}, got {digest}")
-    return OnnxModel(content, entry.to_signature(), label=entry.file)
+    return OnnxModel(content, entry.to_signature(), label=entry.file, runtime=runtime)

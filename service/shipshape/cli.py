@@ -9,17 +9,26 @@ import argparse
 import importlib.metadata
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import NoReturn, TypeAlias
 
 from shipshape.errors import ShipshapeError
 from shipshape.types import ImageMethod, Preset
 
 OK, UNUSABLE, INTERRUPTED = 0, 2, 130
 
+_NOTES = """\
+examples:
+  shipshape classify examples/contact.pcd --sensor-height 3 --png out    # a file, and its picture
+  shipshape serve                                                        # the service, on loopback
+
+`shipshape COMMAND --help` says more of each, with an example
+"""
+
 _CLASSIFY_NOTES = """\
-example:
+examples:
+  shipshape classify contact.pcd --sensor-height 3.2 --png out
   shipshape classify scan.npz --sensor-height 3.2 --json | jq .vessel
 
 files (metres, level frame: origin at the LiDAR, x ahead, y to port, z up):
@@ -57,10 +66,8 @@ times are written as 50ms, 2s or 1m
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     arguments = build_parser().parse_args(argv)
-    from shipshape.commands import COMMANDS  # noqa: PLC0415  its libraries take a second, --help must not wait
-
     try:
-        code = COMMANDS[arguments.command](arguments)
+        code = _command(arguments.command)(arguments)
         sys.stdout.flush()
         return code
     except BrokenPipeError:
@@ -74,11 +81,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         return UNUSABLE
 
 
+def _command(name: str) -> Callable[[argparse.Namespace], int]:
+    """What carries it out; its libraries take up to a second to import, for which --help must not wait."""
+    if name == "serve":
+        from shipshape.serve import serve  # noqa: PLC0415
+
+        return serve
+    from shipshape.commands import COMMANDS  # noqa: PLC0415
+
+    return COMMANDS[name]
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The parser of all commands; `arguments.command` names the one chosen."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="shipshape",
         description="Recognises and restores vessels from sparse LiDAR clusters.",
+        epilog=_NOTES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=importlib.metadata.version("shipshape"))
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
@@ -92,10 +112,18 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-_Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+class _Parser(argparse.ArgumentParser):
+    """Says what to do next beside what is wrong."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with 2."""
+        super().error(f"{message}; see `{self.prog} --help`")
 
 
-def _add(commands: _Commands, name: str, summary: str, notes: str) -> argparse.ArgumentParser:
+_Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
+
+
+def _add(commands: _Commands, name: str, summary: str, notes: str) -> _Parser:
     return commands.add_parser(
         name,
         help=summary,
@@ -123,7 +151,9 @@ def _add_classify(commands: _Commands) -> None:
     parser.set_defaults(command="classify")
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     parser.add_argument("--json", action="store_true", help="one JSON object a cluster and line")
-    parser.add_argument("--png", type=Path, metavar="DIR", help="draw a picture of each cluster into DIR")
+    parser.add_argument(
+        "--png", type=Path, metavar="DIR", help="draw a picture of each cluster into DIR, as NAME.png"
+    )
     parser.add_argument("--preset", type=Preset, choices=list(Preset), default=Preset.BEST)
     parser.add_argument(
         "--image-method", type=ImageMethod, choices=list(ImageMethod), help="with --preset paper alone"
@@ -223,7 +253,8 @@ def _add_admin(commands: _Commands) -> None:
         "drain": "not ready any more, still answering",
         "resume": "ready again",
     }.items():
-        parser = _add(calls, call, summary, f"example:\n  shipshape admin {call}")
+        folder = " models-2" if call == "swap" else ""
+        parser = _add(calls, call, summary, f"example:\n  shipshape admin {call}{folder}")
         parser.set_defaults(command="admin", call=call)
         parser.add_argument("--url", default="http://127.0.0.1:9090", help="default: %(default)s")
         parser.add_argument(

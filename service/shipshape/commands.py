@@ -26,7 +26,6 @@ from shipshape.errors import BundleError, FileError
 from shipshape.pipeline import Pipeline
 from shipshape.render import render_png
 from shipshape.sample import sample_contact
-from shipshape.serving.life import serve as serve_until_signal
 from shipshape.serving.tokens import check_name, fresh_token, hash_of
 from shipshape.settings import SettingsError, load_settings
 from shipshape.tables import answer_line, columns, refusal_line, title_line
@@ -35,13 +34,6 @@ from shipshape.types import ImageMethod, Options, Preset
 OK, REFUSED = 0, 1
 CHECK_RUNS = 20
 PROGRESS_STEP_S = 0.1
-
-
-def serve(arguments: argparse.Namespace) -> int:
-    """Open the doors until a signal."""
-    names = ("host", "rest_port", "grpc_port", "workers", "bundle")
-    given = {name: value for name in names if (value := getattr(arguments, name)) is not None}
-    return serve_until_signal(load_settings(**given))
 
 
 def classify(arguments: argparse.Namespace) -> int:
@@ -110,7 +102,6 @@ def token(arguments: argparse.Namespace) -> int:
 
 
 COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
-    "serve": serve,
     "classify": classify,
     "check": check,
     "bundle verify": verify,

@@ -9,6 +9,8 @@ ShipshapeError
 |-- Cancelled             executor -> stages: the caller left
 |-- NotReady              the service is starting or stopping
 |-- Unauthenticated       caller -> service: a token that is asked for is missing or unknown
+|-- Unreachable           caller -> service: no service answers at an address
+|-- ServiceFault          service -> caller: it failed, or it is no service of ours
 |-- Conflict              operator -> service: the call does not fit the state it is in
 |-- BundleError           files -> models: the bundle is missing, damaged or of another shape
 |-- FileError             file -> clusters: the file cannot be read
@@ -56,6 +58,14 @@ class NotReady(ShipshapeError):
 
 class Unauthenticated(ShipshapeError):
     """The caller has not shown who it is."""
+
+
+class Unreachable(ShipshapeError):
+    """No service answers at an address, or the connection to it broke."""
+
+
+class ServiceFault(ShipshapeError):
+    """A service failed, and its log says why; or what answered is no service of ours."""
 
 
 class Conflict(ShipshapeError):

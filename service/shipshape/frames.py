@@ -5,8 +5,6 @@ import math
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from shipshape import kernels
-
 
 def wrap_angle(angle: float) -> float:
     """The same angle in (-pi, pi], radians."""
@@ -30,6 +28,8 @@ def to_vessel(
     points_level: Float32[np.ndarray, "n 3"], heading: float, origin_level: tuple[float, float, float]
 ) -> Float32[np.ndarray, "n 3"]:
     """Level-frame points expressed in the frame with yaw `heading` and its origin at `origin_level`."""
+    from shipshape import kernels  # noqa: PLC0415  # numba is large, and the service computes in other processes
+
     points_level = np.ascontiguousarray(points_level, np.float32)
     points_vessel: Float32[np.ndarray, "n 3"] = kernels.into_frame(
         points_level, float(heading), _floats(origin_level)
@@ -41,6 +41,8 @@ def to_level(
     points_vessel: Float32[np.ndarray, "n 3"], heading: float, origin_level: tuple[float, float, float]
 ) -> Float32[np.ndarray, "n 3"]:
     """The inverse of `to_vessel`."""
+    from shipshape import kernels  # noqa: PLC0415  # as above
+
     points_vessel = np.ascontiguousarray(points_vessel, np.float32)
     points_level: Float32[np.ndarray, "n 3"] = kernels.out_of_frame(
         points_vessel, float(heading), _floats(origin_level)

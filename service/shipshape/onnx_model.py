@@ -1,4 +1,4 @@
-"""A trained network as a function of arrays; the only file that knows onnxruntime."""
+"""A trained network as a function of arrays; the only file that runs onnxruntime (`providers` says on what)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 
 from shipshape.errors import BundleError
+from shipshape.micro_batches import Arrays, MicroBatches
+from shipshape.providers import PROCESSOR, PROVIDERS, Provider, Runtime
 
 _DTYPES = {
     "tensor(float)": "float32",
@@ -42,25 +43,43 @@ class Signature:
 
 
 class OnnxModel:
-    """A network on one CPU thread: the executor already keeps every core busy with one contact each.
+    """A network on a GPU, or on one CPU thread: the executor already keeps every core busy with a contact each.
 
     Args:
         source: The ONNX file, or its bytes (hash the bytes first and nothing can change in between).
         signature: What the file must be; None takes the file's own.
         label: How error messages call it; by default the file's name.
+        runtime: Where it runs. Calls share runs only if all inputs have rows: a free first dimension.
 
     Raises:
-        BundleError: The file is missing, damaged, or not of the promised signature.
+        BundleError: The file is missing, damaged, not of the promised signature, or does not run there.
     """
 
-    def __init__(self, source: Path | bytes, signature: Signature | None = None, *, label: str = "") -> None:
+    _batches: MicroBatches | None = None
+
+    def __init__(
+        self,
+        source: Path | bytes,
+        signature: Signature | None = None,
+        *,
+        label: str = "",
+        runtime: Runtime = PROCESSOR,
+    ) -> None:
         label = label or (source.name if isinstance(source, Path) else "the model")
         self._label = label
-        self._session = _open_session(source, label)
+        self._session = _open_session(source, label, runtime.provider)
         self.signature = _read_signature(self._session)
         if signature is not None:
             _compare(signature, self.signature, label)
         self._output_names = [spec.name for spec in self.signature.outputs]
+        if runtime.micro_batches != "off" and all(spec.shape[:1] == (-1,) for spec in self.signature.inputs):
+            measured = runtime.micro_batches == "auto"
+            self._batches = MicroBatches(self._forward, label=label, buckets=runtime.buckets, measured=measured)
+
+    @property
+    def most_rows(self) -> int:
+        """Rows up to which calls that meet become one run, if they are of one shape; 1 where none do."""
+        return 1 if self._batches is None else self._batches.largest
 
     def run(self, **inputs: np.ndarray) -> list[np.ndarray]:
         """The outputs, in the order of the signature, for inputs of its names, shapes and dtypes.
@@ -68,6 +87,9 @@ class OnnxModel:
         Raises:
             BundleError: The network does not take such inputs, so it is not the one that its caller was made for.
         """
+        return self._forward(inputs) if self._batches is None else self._batches.run(inputs)
+
+    def _forward(self, inputs: Arrays) -> list[np.ndarray]:
         try:
             outputs: list[np.ndarray] = self._session.run(self._output_names, inputs)
         except Exception as error:  # onnxruntime's own exceptions share no base class
@@ -77,8 +99,10 @@ class OnnxModel:
         return outputs
 
 
-def _open_session(source: Path | bytes, label: str) -> Any:
+def _open_session(source: Path | bytes, label: str, provider: Provider) -> Any:
     content = source if isinstance(source, bytes) else _read(source, label)
+    import onnxruntime  # noqa: PLC0415  # large, and the service computes in other processes
+
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -87,11 +111,17 @@ def _open_session(source: Path | bytes, label: str) -> Any:
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.inter_op.allow_spinning", "0")
     try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(
+            content, options, providers=PROVIDERS[provider], enable_fallback=False
+        )
     except Exception as error:  # onnxruntime's own exceptions share no base class
+        failure = "parse as one" if provider is Provider.CPU else f"start on {provider} as one"
         raise BundleError(
-            f"expected {label} to be a complete ONNX file, got {len(content)} bytes that do not parse as one"
+            f"expected {label} to be a complete ONNX file, got {len(content)} bytes that do not {failure}"
         ) from error
+    if (found := session.get_providers()[0]) != provider.full_name:  # it goes on without a word
+        raise BundleError(f"expected {label} to run on {provider.full_name}, got {found}")
+    return session
 
 
 def _read(path: Path, label: str) -> bytes:

@@ -99,8 +99,7 @@ class Pipeline:
 
     def ladder(self, options: Options) -> tuple[RungStages, ...]:
         """The rungs a contact may be computed on, the best first, down to the lowest that the caller accepts."""
-        accepted = list(Rung)[: list(Rung).index(options.lowest_rung) + 1]
-        return tuple(rung for rung in self._ladders[options.preset] if rung.name in accepted)
+        return tuple(rung for rung in self._ladders[options.preset] if options.accepts(rung.name))
 
     def finish(
         self, work: Work, stage_ms: Mapping[str, float], rung: Rung = Rung.FULL, rung_reason: str = ""
@@ -135,6 +134,7 @@ class Pipeline:
             image_method=work.options.image_method if work.options.preset is Preset.PAPER else None,
             bundle=self.bundle.digest,
             stage_ms=dict(stage_ms),
+            descriptors=spd2.to_grey(work.images),
         )
 
     def _is_unknown(self, work: Work) -> bool:

@@ -1,5 +1,6 @@
 """Environment -> frozen settings; every one has a default that works, and a wrong one stops the start."""
 
+import difflib
 import os
 from pathlib import Path
 from typing import Any, Literal
@@ -31,6 +32,11 @@ class Settings(BaseSettings):
     )
     rest_port: int = Field(8080, ge=0, le=65535, description="TCP port of the REST door; 0 picks a free one.")
     grpc_port: int = Field(50051, ge=0, le=65535, description="TCP port of the gRPC door; 0 picks a free one.")
+    share_ports: bool = Field(
+        False,
+        description="Lets several services listen on the same ports (SO_REUSEPORT); the system spreads "
+        "connections among them. One service is the rule: queue, lanes and limits of clients are each one's own.",
+    )
     bundle: Path = Field(
         default_factory=default_bundle,
         description="Folder of the model bundle. Default: ./models, else the models of the source checkout.",
@@ -39,8 +45,24 @@ class Settings(BaseSettings):
         0,
         ge=0,
         le=1024,
-        description="Threads that compute; 0 is one a usable core. More of them share the same cores: "
-        "higher latency, no more throughput.",
+        description="What computes, processes or threads: 0 is one a usable core, with a GPU as many threads as "
+        "fill two of its runs. More of them share the same cores: higher latency, no more throughput.",
+    )
+    compute: Literal["processes", "threads"] = Field(
+        "processes",
+        description="Where contacts are computed: in `processes` forked from one that holds the bundle, each with "
+        "an interpreter for itself, or in `threads` of the service, which share one: less memory, slower. With a "
+        "GPU always in threads.",
+    )
+    provider: Literal["auto", "cpu", "cuda"] = Field(
+        "auto",
+        description="Where networks run. auto: on an NVIDIA GPU if shipshape[gpu] is installed and finds one, "
+        "else on the processor; cuda: the service does not start without a GPU. docs/gpu.md shows how.",
+    )
+    micro_batches: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description="Whether contacts that meet at a network share its runs, where they are computed in threads. "
+        "auto: as far as it is measured to pay at the start; a processor gains nothing. on is for measuring.",
     )
     queue_limit: int = Field(
         512,
@@ -154,6 +176,19 @@ class Settings(BaseSettings):
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         "info", description="Least severe log line written; debug adds one line a request."
     )
+    traces_url: str | None = Field(
+        None,
+        pattern="^https?://",
+        description="Collector of OpenTelemetry that spans are sent to, OTLP over HTTP, such as "
+        "http://127.0.0.1:4318/v1/traces; needs the extra shipshape[otel]. None makes no spans and sends nothing.",
+    )
+    traces_share: float = Field(
+        1.0,
+        ge=0,
+        le=1,
+        description="Share of the requests to make spans of, where their callers have not decided it. Each costs "
+        "a fraction of a millisecond of a core; the log names the trace of all.",
+    )
 
     @model_validator(mode="after")
     def _a_scan_fits_the_queue(self) -> "Settings":
@@ -201,7 +236,9 @@ def load_settings(**overrides: Any) -> Settings:
     known = {f"{PREFIX}{name}".upper() for name in Settings.model_fields}
     unknown = sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)
     if unknown:
-        raise SettingsError(f"expected only known {PREFIX}* variables, got {', '.join(unknown)}")
+        near = difflib.get_close_matches(unknown[0].upper(), known, 1)
+        meant = f": did you mean {near[0]}?" if near else ""
+        raise SettingsError(f"expected only known {PREFIX}* variables, got {', '.join(unknown)}{meant}")
     try:
         return Settings(**overrides)
     except ValidationError as error:

@@ -4,19 +4,21 @@ import asyncio
 import collections
 import json
 import logging
+import random
 import sys
 import time
-import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import partial
-from typing import Protocol
+from functools import cache, partial
+from typing import Any, Protocol, TypeVar
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info, ProcessCollector
 
+from shipshape import tracing
 from shipshape.budget import WINDOWS, Budget, Level
+from shipshape.histogram import BulkHistogram
 
 # Seconds, but those of requests: shares of the budget.
 STAGE_BUCKETS = (5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3, 25e-3, 50e-3, 0.1, 0.4, 1.6)
@@ -30,14 +32,17 @@ STREAM = "recognise_stream"  # each of its messages counts as a request of many 
 INFER = "infer"  # that of the Open Inference Protocol, whose request may be either
 RECOGNISING = (SINGLE, SCAN, STREAM, INFER)
 
+M = TypeVar("M", Counter, Gauge, Histogram)
 request_id: ContextVar[str] = ContextVar("request_id", default="")
 _logger = logging.getLogger(__name__)
 
 
-def new_request_id(proposed: str = "") -> str:
-    """The caller's own id if it is harmless in a log, else a fresh one; set for the current context."""
+def new_request_id(proposed: str = "", traceparent: str = "") -> str:
+    """The caller's own id if it is harmless in a log, else a fresh one; set for this context, as is its trace."""
+    tracing.follow(traceparent)
     harmless = 0 < len(proposed) <= 64 and all(char.isalnum() or char in "-_.:" for char in proposed)
-    chosen = proposed if harmless and proposed.isascii() else uuid.uuid4().hex[:16]
+    # Not the system's random bytes: asking for them hands the interpreter's lock to others, for no gain here.
+    chosen = proposed if harmless and proposed.isascii() else f"{random.getrandbits(64):016x}"
     request_id.set(chosen)
     return chosen
 
@@ -49,6 +54,12 @@ class Outcome:
     kind: str = OK
     contacts: int = 0  # that the request brought, as soon as it is known
     urgent: bool = True  # held to the budget, which work of the batch lane is not
+    stage_ms: Mapping[str, float] | None = None  # once they are known, over all contacts
+    computed_ns: int = 0  # when that was, since 1970
+
+    def computed(self, stage_ms: Mapping[str, float]) -> None:
+        """The stages have ended, just now."""
+        self.stage_ms, self.computed_ns = stage_ms, time.time_ns()
 
 
 class Metrics:
@@ -57,34 +68,39 @@ class Metrics:
     Args:
         registry: Holds them.
         budget: Told of every answer; the buckets of request times lie around it.
+
+    Attributes:
+        observe_stage: Told the name of a stage that ran, and its seconds.
+        observe_wait: Told the lane of a contact that was taken up, and the seconds that it had waited.
     """
 
     def __init__(self, registry: CollectorRegistry, budget: Budget) -> None:
         self.registry = registry
         self.budget = budget
-        histogram, counter = partial(Histogram, registry=registry), partial(Counter, registry=registry)
-        gauge = partial(Gauge, registry=registry)
-        self._stage = histogram("shipshape_stage_seconds", "Time of one stage.", ["stage"], buckets=STAGE_BUCKETS)
+        histogram, counter = partial(_children, Histogram, registry), partial(_children, Counter, registry)
+        bulk = partial(BulkHistogram, buckets=STAGE_BUCKETS, registry=registry)
+        self.observe_stage = bulk("shipshape_stage_seconds", "Time of one stage.", "stage").observe
+        self.observe_wait = bulk(
+            "shipshape_queue_seconds", "Time that a contact waited for a worker.", "lane"
+        ).observe
         self._request = histogram(
             "shipshape_request_seconds",
             "Time of one request at the door, whatever the outcome.",
             ["door", "method", "outcome"],
             buckets=[share * budget.budget_s for share in REQUEST_BUCKETS],
         )
-        self._wait = histogram(
-            "shipshape_queue_seconds", "Time that a contact waited for a worker.", ["lane"], buckets=STAGE_BUCKETS
-        )
-        self._age = histogram(
+        self._age = Histogram(
             "shipshape_age_seconds",
             "Age of the points when their request came, where the caller tells it.",
             buckets=AGE_BUCKETS,
+            registry=registry,
         )
         self._contacts = counter("shipshape_contacts", "Contacts answered or refused.", ["door", "outcome"])
         self._client_refusals = counter(
             "shipshape_client_refusals", "Requests refused for who asks: token, rate or under_way.", ["reason"]
         )
-        self._in_flight = gauge("shipshape_in_flight", "Requests under way.", ["door"])
-        self._ready = gauge("shipshape_ready", "1 while the service takes requests.")
+        self._in_flight = _children(Gauge, registry, "shipshape_in_flight", "Requests under way.", ["door"])
+        self._ready = Gauge("shipshape_ready", "1 while the service takes requests.", registry=registry)
         self._held = counter(
             "shipshape_budget",
             "Requests held to the latency budget: answered inside it or not. Batch work is not held to it.",
@@ -94,18 +110,10 @@ class Metrics:
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
         ProcessCollector(registry=registry)
 
-    def observe_stage(self, stage: str, seconds: float) -> None:
-        """One stage ran; seconds."""
-        self._stage.labels(stage).observe(seconds)
-
     def count_contacts(self, door: str, outcomes: Iterable[str]) -> None:
         """Contacts of a scan were answered ("ok") or refused (the kind of the error)."""
         for outcome, count in collections.Counter(outcomes).items():
-            self._contacts.labels(door, outcome).inc(count)
-
-    def observe_wait(self, lane: str, seconds: float) -> None:
-        """A contact of this lane waited; seconds."""
-        self._wait.labels(lane).observe(seconds)
+            self._contacts(door, outcome).inc(count)
 
     def observe_age(self, seconds: float) -> None:
         """The points of a request were this old; seconds."""
@@ -113,7 +121,7 @@ class Metrics:
 
     def count_client_refusal(self, reason: str) -> None:
         """A request was refused for who asks; who that is would be a label without bounds."""
-        self._client_refusals.labels(reason).inc()
+        self._client_refusals(reason).inc()
 
     def set_ready(self, ready: bool) -> None:
         """Whether the service takes requests."""
@@ -124,16 +132,19 @@ class Metrics:
         self._bundle.info({"name": name, "digest": digest})
 
     @contextmanager
-    def request(self, door: str, method: str) -> Iterator[Outcome]:
+    def request(self, door: str, method: str, waited: float = 0.0) -> Iterator[Outcome]:
         """Time one request; its outcome is what the block leaves in the yielded object.
+
+        `waited` is how long ago its first byte came, seconds.
 
         Contacts of an answered scan are counted one by one, by `count_contacts`; those of a scan that was refused
         as a whole are counted here, each with the kind of the refusal.
         """
         outcome = Outcome(contacts=int(method == SINGLE))
-        start = time.perf_counter()
-        in_flight = self._in_flight.labels(door)
+        start = time.perf_counter() - waited
+        in_flight = self._in_flight(door)
         in_flight.inc()
+        span = tracing.begin(f"{door} {method}")
         try:
             yield outcome
         except BaseException as error:
@@ -143,13 +154,35 @@ class Metrics:
         finally:
             seconds = time.perf_counter() - start
             in_flight.dec()
-            self._request.labels(door, method, outcome.kind).observe(seconds)
+            self._request(door, method, outcome.kind).observe(seconds)
             if outcome.contacts and (method == SINGLE or outcome.kind not in (OK, DEGRADED)):
-                self._contacts.labels(door, outcome.kind).inc(outcome.contacts)
+                self._contacts(door, outcome.kind).inc(outcome.contacts)
             if method in RECOGNISING and outcome.urgent and outcome.kind in HELD:
                 inside = self.budget.tell(seconds, answered=outcome.kind in (OK, DEGRADED))
-                self._held.labels(str(inside).lower()).inc()
-            _logger.debug("%s %s %s %.2f ms", door, method, outcome.kind, seconds * 1e3)
+                self._held(str(inside).lower()).inc()
+            _tell(door, method, outcome, seconds, span)
+
+
+def _tell(door: str, method: str, outcome: Outcome, seconds: float, span: tracing.Span | None) -> None:
+    """One line in the log, if it takes any so fine, and the end of the span, if there is one."""
+    if span is None and not _logger.isEnabledFor(logging.DEBUG):
+        return
+    fields = {"door": door, "method": method, "outcome": str(outcome.kind), "contacts": outcome.contacts}
+    text = "%s %s %s %.2f ms"
+    extra = {"fields": {**fields, "ms": round(seconds * 1e3, 3)}}
+    _logger.debug(text, door, method, outcome.kind, seconds * 1e3, extra=extra)
+    if span is not None:
+        attributes = {f"shipshape.{name}": value for name, value in fields.items()}
+        attributes["shipshape.request_id"] = request_id.get()
+        failed = outcome.kind == INTERNAL
+        span.end(attributes, outcome.stage_ms or {}, outcome.computed_ns, failed=failed)
+
+
+def _children(
+    kind: type[M], registry: CollectorRegistry, name: str, text: str, labels: Sequence[str], **more: Any
+) -> Callable[..., M]:
+    """A metric's child by the values of its labels; kept, for the metric itself takes a lock to find it."""
+    return cache(kind(name, text, labels, registry=registry, **more).labels)
 
 
 class Workers(Protocol):
@@ -209,13 +242,16 @@ def _burn(budget: Budget, window: str) -> float:
 
 
 class JsonLines(logging.Formatter):
-    """One JSON object a line: time (UTC), level, logger, message, request_id, traceback."""
+    """One JSON object a line: time (UTC), level, logger, message, request_id, trace_id, more, traceback.
+
+    What more there is of a request: door, method, outcome, contacts, ms.
+    """
 
     converter = staticmethod(time.gmtime)
 
     def format(self, record: logging.LogRecord) -> str:
         """The record as one line of JSON."""
-        line = {
+        line: dict[str, Any] = {
             "time": f"{self.formatTime(record, '%Y-%m-%dT%H:%M:%S')}.{int(record.msecs):03d}Z",
             "level": record.levelname.lower(),
             "logger": record.name,
@@ -223,6 +259,9 @@ class JsonLines(logging.Formatter):
         }
         if request_id.get():
             line["request_id"] = request_id.get()
+        if tracing.trace_id.get():
+            line["trace_id"] = tracing.trace_id.get()
+        line |= getattr(record, "fields", {})
         if record.exc_info:
             line["traceback"] = self.formatException(record.exc_info)
         return json.dumps(line, ensure_ascii=False)

@@ -75,6 +75,11 @@ class Options:
     image_method: ImageMethod = ImageMethod.FULL_SIDE  # used by preset `paper` alone
     lowest_rung: Rung = Rung.HEADING_AND_BOX  # the cheapest answer that is better than none
 
+    def accepts(self, rung: Rung) -> bool:
+        """Whether an answer on this rung is better than none."""
+        rungs = list(Rung)
+        return rungs.index(rung) <= rungs.index(self.lowest_rung)
+
 
 @dataclass(frozen=True, slots=True)
 class ReferenceBox:
@@ -134,6 +139,10 @@ class ImagePair:
     after: UInt8[np.ndarray, "rows columns 3"]
 
 
+def _none_described() -> UInt8[np.ndarray, "0 channels rows columns"]:
+    return np.empty((0, 5, 16, 32), np.uint8)
+
+
 @dataclass(frozen=True, slots=True)
 class Recognition:
     """What Shipshape says of one contact."""
@@ -160,6 +169,8 @@ class Recognition:
     image_method: ImageMethod | None  # None: the image of preset `best`
     bundle: str  # digest of the model bundle
     stage_ms: Mapping[str, float] = field(default_factory=dict)
+    # SPD2 images of the keypoints, 255 for 1 (see `stages.spd2`); none below rung `full`
+    descriptors: UInt8[np.ndarray, "described channels rows columns"] = field(default_factory=_none_described)
 
     @property
     def measured_points(self) -> int:

@@ -44,3 +44,4 @@ class Work:
         points = self.contact.points_level
         self.restored = RestoredCloud(points, np.ones(len(points), np.bool_))
         self.keypoints_vessel = np.empty((0, 3), np.float32)
+        self.images = np.empty((0, 5, 16, 32), np.float32)

@@ -33,8 +33,10 @@ def installed(folder):
         os.utime(path, (now + 100 - age, now + 100 - age))
 
 
-def make(folder, *arguments):
-    alone = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+def make(folder, *arguments, **variables):
+    alone = {
+        name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")
+    } | variables
     return subprocess.run(
         ["make", *arguments], check=False, cwd=folder, env=alone, capture_output=True, text=True, timeout=60
     )
@@ -59,6 +61,18 @@ def test_a_lock_that_changed_installs_again(copy):
     later = path.stat().st_mtime + 1000
     os.utime(path, (later, later))
     assert "--requirement requirements/service.lock" in make(copy, "-n", "demo").stdout
+
+
+def test_without_npm_the_console_is_left_out_and_make_goes_on(copy):
+    (copy / "console").mkdir()
+    shutil.copy(ROOT / "console/build.sh", copy / "console")
+    (copy / "bin").mkdir()
+    for tool in ("sh", "dirname", "make"):
+        (copy / "bin" / tool).symlink_to(shutil.which(tool))
+    built = make(copy, "service/shipshape/console/static/index.html", PATH=str(copy / "bin"))
+    assert built.returncode == 0
+    assert "console: expected Node.js with npm, got none" in built.stderr
+    assert built.stdout == "make: / will have no page, everything else works; make console tries again\n"
 
 
 @pytest.mark.parametrize("target", ["demo", "test"])

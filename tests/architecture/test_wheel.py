@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from architecture.tree import ROOT
+from shipshape.console import built
 
 # Imports all of the wheel in an interpreter without the lab's packages, nor those of the load test's extra.
 IMPORT_EVERYTHING = """
@@ -50,7 +51,8 @@ def unpacked(wheel):
 def test_the_wheel_holds_the_service_alone(unpacked):
     assert {path.name.partition("-")[0] for path in unpacked.iterdir()} == {"shipshape"}
     kinds = {path.suffix for path in (unpacked / "shipshape").rglob("*") if path.is_file()}
-    assert kinds == {".py", ".pyi", ".npy", ".md", ".html"}
+    console = {".css", ".js", ".json", ".svg", ".txt"} if built() else set()
+    assert kinds == {".py", ".pyi", ".npy", ".md", ".html", ".typed"} | console
 
 
 def test_the_wheel_asks_for_nothing_of_the_lab(unpacked):

@@ -99,11 +99,14 @@ def test_who_holds_none_does_not(locked, given, words):
 
 def test_every_path_but_health_asks_for_a_token(locked):
     contract = locked.rest.get("/openapi.json", headers={"Authorization": bearer(FLEET)})
-    for path in (*contract.json()["paths"], "/openapi.json", "/nowhere", "/v2/health/ready", "/livez/", "//livez"):
+    misspelt = ("/livez/", "//livez", "//", "/console", "//console/main.js")
+    for path in (*contract.json()["paths"], "/openapi.json", "/nowhere", "/v2/health/ready", *misspelt):
         for method in ("GET", "POST", "OPTIONS"):
-            refused = locked.rest.request(method, path).status_code == 401
+            url = f"http://127.0.0.1:{locked.addresses.rest_port}{path}"  # whole: the client would mend it
+            refused = locked.rest.request(method, url).status_code == 401
             assert refused is (path not in OPEN), f"{method} {path}"
     assert locked.rest.get("/readyz").json() == {"status": "ready"}
+    assert all(locked.rest.get(path).status_code != 401 for path in ("/", "/console/main.js"))
 
 
 def test_every_service_but_health_asks_for_a_token(locked):

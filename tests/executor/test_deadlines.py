@@ -8,8 +8,8 @@ from executor.test_executor import FAR, PATIENCE, Gate, HandClock, Note, task
 from serving.fakes import until
 from shipshape.errors import DeadlineExceeded
 from shipshape.executor import Executor
+from shipshape.executor.crew import WEDGED_S
 from shipshape.executor.deadlines import FEW, Deadlines
-from shipshape.executor.executor import WEDGED_S
 from shipshape.executor.ticket import Ticket
 
 

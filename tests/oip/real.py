@@ -7,7 +7,8 @@ import pytest
 from serving.fakes import running
 from shipshape.bundle import load_bundle
 from shipshape.pipeline import Pipeline
-from shipshape.serving.core import Model
+from shipshape.render import render_png
+from shipshape.serving.local_model import LocalModel
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -19,5 +20,5 @@ def real():
         pytest.skip("models/ has no manifest.toml yet")
     with running(opened=False) as doors:
         bundle = load_bundle(MODELS)
-        doors.service.open(Model(bundle, Pipeline(bundle)))
+        doors.service.open(LocalModel(bundle, Pipeline(bundle), render_png))
         yield doors

@@ -9,8 +9,7 @@ from onnx import numpy_helper
 from serving.processes import MODELS
 from shipshape.bundle import load_bundle
 from shipshape.bundle_writer import write_manifest
-from shipshape.pipeline import Pipeline
-from shipshape.serving.core import Model
+from shipshape.serving.prepare import load_local
 
 WIDER = 2.0  # times the heading_std of the shipped bundle
 
@@ -54,5 +53,4 @@ def fill_with_nan(network):
 
 
 def load_model(folder):
-    bundle = load_bundle(folder)
-    return Model(bundle, Pipeline(bundle))
+    return load_local(folder, 65_536)

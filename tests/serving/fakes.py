@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipshape.bundle import Bundle, CatalogueVessel
-from shipshape.serving.core import Model
+from shipshape.serving.local_model import LocalModel
 from shipshape.serving.service import Service
 from shipshape.settings import Settings
 from shipshape.types import (
@@ -36,6 +36,7 @@ PATIENCE = 10.0
 DIGEST = "ab" * 32
 PNG = b"\x89PNG fake"
 SECRET = "the secret of the stage"
+DESCRIPTORS = np.random.default_rng(0).integers(0, 256, (3, 5, 16, 32), np.uint8)
 HEAD = "POST /v1/recognise HTTP/1.1\r\nHost: x\r\nContent-Type: application/octet-stream\r\nContent-Length: {}\r\n"
 HALF = HEAD.format(4800).encode() + b"\r\nabc"
 
@@ -127,6 +128,7 @@ def recognition_of(work, stage_ms):
         image_method=work.options.image_method if paper else None,
         bundle=DIGEST,
         stage_ms=stage_ms,
+        descriptors=DESCRIPTORS,
     )
 
 
@@ -168,6 +170,10 @@ def image_methods():
     return list(ImageMethod)
 
 
+def fake_model(pipeline, **fields):
+    return LocalModel(replace(FAKE_BUNDLE, **fields), pipeline, lambda contact, recognition: PNG)
+
+
 @contextmanager
 def running(*, opened=True, load=None, **settings):
     """A service around a fresh fake pipeline on free ports; `load` reads bundles for a swap."""
@@ -182,13 +188,13 @@ def running(*, opened=True, load=None, **settings):
     }
     service = Service(
         Settings(**settings),
-        lambda contact, recognition: PNG,
+        settings["workers"],
         load=load,
         on_death=lambda: pytest.fail("a door died"),
     )
     addresses = service.start()
     if opened:
-        service.open(Model(FAKE_BUNDLE, pipeline))
+        service.open(fake_model(pipeline))
     channel = grpc.insecure_channel(f"127.0.0.1:{addresses.grpc_port}")
     rest = httpx.Client(base_url=f"http://127.0.0.1:{addresses.rest_port}", timeout=PATIENCE, trust_env=False)
     with channel, rest:

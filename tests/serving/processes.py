@@ -15,12 +15,10 @@ TESTS = Path(__file__).parents[1]
 MODELS = TESTS.parent / "models"
 SERVE_FAKES = """
 import sys
-from serving.fakes import FAKE_BUNDLE, PNG, FakePipeline
+from serving.fakes import FakePipeline, fake_model
 from shipshape.serving import life
 from shipshape.settings import load_settings
-life.load_bundle = lambda path: FAKE_BUNDLE
-life.Pipeline = lambda bundle, limits: FakePipeline()
-life.render_png = lambda contact, recognition: PNG
+life.load_model = lambda settings, runtime, folder: fake_model(FakePipeline())
 sys.exit(life.serve(load_settings()))
 """
 START_PATIENCE = 60.0

@@ -3,16 +3,14 @@
 import hashlib
 import json
 from contextlib import contextmanager
-from dataclasses import replace
 
 import httpx
 import pytest
 
-from serving.fakes import DIGEST, FAKE_BUNDLE, PATIENCE, FakePipeline, cluster, running
+from serving.fakes import DIGEST, PATIENCE, FakePipeline, cluster, fake_model, running
 from shipshape.cli import main
 from shipshape.errors import BundleError, InvalidInput, SettingsError
 from shipshape.serving.admin.control import folder_below
-from shipshape.serving.core import Model
 from shipshape.settings import load_settings
 
 TOKEN = "a token that nobody guesses"
@@ -32,8 +30,8 @@ def load(folder):
     if folder.name == "odd":
         raise ZeroDivisionError
     if folder.name in ("first", "same"):
-        return Model(FAKE_BUNDLE, FakePipeline())
-    return Model(replace(FAKE_BUNDLE, name="other", digest=OTHER), FakePipeline())
+        return fake_model(FakePipeline())
+    return fake_model(FakePipeline(), name="other", digest=OTHER)
 
 
 @contextmanager

@@ -6,9 +6,11 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from serving.fakes import PATIENCE, cluster, request, running
 from shipshape.executor.admission import HEADROOM
+from shipshape.serving.grpc.guard import Call, current_call
 from shipshape.serving.grpc.servicer import Servicer
 from shipshape.serving.load_report import as_message
 from shipshape.serving.timing import Timeouts
+from shipshape.telemetry import Outcome
 from shipshape.v1 import shipshape_pb2 as pb
 
 POINTS = cluster()
@@ -119,9 +121,13 @@ def test_every_answer_carries_the_load(doors):
     text = doors.ask_rest(POINTS).headers["endpoint-load-metrics"]
     assert text == "TEXT application_utilization=0.000"
     context, core, metrics = Context(), doors.service._core, doors.service._metrics
+    current_call.set(Call(Outcome(), None))
     Servicer(core, metrics, Timeouts(), doors.service._grpc._streams).Recognise(request(POINTS), context)
     report = orca().FromString(context.trailing["endpoint-load-metrics-bin"])
     assert 0.0 <= report.application_utilization <= 1.0
+    assert float(context.trailing["shipshape-load"]) == pytest.approx(report.application_utilization, abs=1e-3)
+    _, call = doors.ask_grpc(POINTS)
+    assert 0.0 <= float(dict(call.trailing_metadata())["shipshape-load"]) <= 1.0
 
 
 def test_the_load_is_the_message_that_balancers_know():

@@ -5,7 +5,7 @@ from grpc_health.v1 import health_pb2
 from grpc_health.v1.health_pb2_grpc import HealthStub
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 
-from serving.fakes import DIGEST, PATIENCE, PNG, SECRET, cluster, image_methods, request, running
+from serving.fakes import DESCRIPTORS, DIGEST, PATIENCE, PNG, SECRET, cluster, image_methods, request, running
 from shipshape.serving.grpc.convert import IMAGE_METHODS
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -59,6 +59,9 @@ def test_what_is_wished_for_is_in_the_answer(doors):
     assert (found.images.before.rows, found.images.before.columns, found.images.before.channels) == (64, 64, 3)
     assert found.images.before.values[:4] == bytes([0, 1, 2, 3])
     assert found.images.after.values[:4] == bytes([255, 254, 253, 252])
+    assert [(one.rows, one.columns, one.channels) for one in found.descriptors] == [(16, 32, 5)] * 3
+    described = [np.frombuffer(one.values, np.uint8).reshape(16, 32, 5) for one in found.descriptors]
+    assert np.array_equal(np.moveaxis(np.stack(described), -1, 1), DESCRIPTORS)
     assert found.rendered_png == PNG
 
 

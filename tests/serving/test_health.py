@@ -9,8 +9,7 @@ import pytest
 from grpc_health.v1 import health_pb2
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
-from serving.fakes import DIGEST, FAKE_BUNDLE, PATIENCE, FakePipeline, cluster, request, running, until
-from shipshape.serving.core import Model
+from serving.fakes import DIGEST, PATIENCE, FakePipeline, cluster, fake_model, request, running, until
 from shipshape.serving.grpc.watching import PLACES
 from shipshape.serving.health import Health, State
 
@@ -86,7 +85,7 @@ def test_warming_ready_and_drained_through_both_doors():
     with running(opened=False) as doors:
         assert told(doors) == NOT_READY
         assert doors.rest.get("/readyz").json()["detail"] == "expected a ready service, got one that is warming"
-        doors.service.open(Model(FAKE_BUNDLE, FakePipeline()))
+        doors.service.open(fake_model(FakePipeline()))
         assert told(doors) == READY
         doors.service.health.drain()
         assert told(doors) == NOT_READY
@@ -112,7 +111,8 @@ def test_a_worker_that_dies_ends_life_and_readiness():
         doomed.join()
         watch = HealthStub(doors.channel).Watch(health_pb2.HealthCheckRequest(service="live"))
         assert next(watch).status == health_pb2.HealthCheckResponse.SERVING
-        doors.service.executor._threads.append(doomed)
+        doors.ask_grpc(cluster())
+        doors.service.executor._threads.hands[0].thread = doomed
         assert next(watch).status == health_pb2.HealthCheckResponse.NOT_SERVING, "nobody had to ask"
         assert told(doors) == (True, False, False)
         assert "shipshape_ready 0.0" in doors.rest.get("/metrics").text

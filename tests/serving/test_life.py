@@ -9,10 +9,11 @@ import threading
 
 import pytest
 
-from serving.fakes import FAKE_BUNDLE, PATIENCE, PNG, FakePipeline
+from serving.fakes import FAKE_BUNDLE, PATIENCE, FakePipeline, fake_model
 from shipshape.errors import BundleError
 from shipshape.serving import life
 from shipshape.serving.core import Core
+from shipshape.serving.local_model import LocalModel
 from shipshape.settings import Settings
 
 
@@ -27,9 +28,7 @@ def _leave_the_test_process_as_it_was(monkeypatch):
 
 @pytest.fixture
 def _fakes(monkeypatch):
-    monkeypatch.setattr(life, "load_bundle", lambda path: FAKE_BUNDLE)
-    monkeypatch.setattr(life, "Pipeline", lambda bundle, limits: FakePipeline())
-    monkeypatch.setattr(life, "render_png", lambda contact, recognition: PNG)
+    monkeypatch.setattr(life, "load_model", lambda settings, runtime, folder: fake_model(FakePipeline()))
 
 
 def test_a_missing_bundle(tmp_path, capsys):
@@ -48,7 +47,7 @@ def test_a_taken_port(door, capsys):
 
 @pytest.mark.usefixtures("_fakes")
 def test_a_bundle_that_fails_its_warm_up(monkeypatch, capsys):
-    monkeypatch.setattr(life, "Pipeline", lambda bundle, limits: None)
+    monkeypatch.setattr(life, "load_model", lambda settings, runtime, folder: LocalModel(FAKE_BUNDLE, None, None))
     assert life.serve(Settings(rest_port=0, grpc_port=0)) == 1
     assert "expected bundle fake to answer the built-in contact, got " in capsys.readouterr().err
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from serving.fakes import DIGEST, PATIENCE, PNG, SECRET, cluster, image_methods, rows, running
+from serving.fakes import DESCRIPTORS, DIGEST, PATIENCE, PNG, SECRET, cluster, image_methods, rows, running
 from shipshape.serving.rest.schemas import ModelAnswer, RecognitionAnswer, ScanAnswer
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -54,6 +54,8 @@ def test_what_is_wished_for_is_in_the_answer(doors):
     before = cv2.imdecode(np.frombuffer(base64.b64decode(answer["images"]["before"]), np.uint8), 1)
     assert before.shape == (64, 64, 3)
     assert before[0, 1].tolist() == [3, 4, 5]
+    described = [cv2.imdecode(np.frombuffer(base64.b64decode(one), np.uint8), -1) for one in answer["descriptors"]]
+    assert np.array_equal(np.stack(described), DESCRIPTORS.reshape(3, 80, 32))
     assert base64.b64decode(answer["rendered_png"]) == PNG
 
 

@@ -144,7 +144,7 @@ def test_numbers_that_the_contract_does_not_know_are_refused(doors, wrong):
 
 
 def test_readiness_falls_while_a_worker_is_stuck(monkeypatch):
-    monkeypatch.setattr("shipshape.executor.executor.WEDGED_S", 0.05)
+    monkeypatch.setattr("shipshape.executor.crew.WEDGED_S", 0.05)
     with running(workers=1) as doors:
         future = doors.stub.Recognise.future(held_request(), timeout=PATIENCE)
         assert doors.pipeline.entered.acquire(timeout=PATIENCE)

@@ -33,7 +33,8 @@ def test_environment_below_overrides(monkeypatch):
 def test_an_unknown_variable_refuses_the_start(monkeypatch):
     monkeypatch.setenv("SHIPSHAPE_REST_PROT", "9000")
     with pytest.raises(
-        SettingsError, match=r"^expected only known SHIPSHAPE_\* variables, got SHIPSHAPE_REST_PROT$"
+        SettingsError,
+        match=r"^expected only known SHIPSHAPE_\* variables, got SHIPSHAPE_REST_PROT: did you mean \w+REST_PORT",
     ):
         load_settings()
 

@@ -117,7 +117,8 @@ def test_a_caller_that_takes_no_answers_is_not_read_any_more():
         until(lambda: doors.service.executor.counts().completed == 4)
         time_passes(doors)
         assert taken == [0, 1, 2, 3]
-        assert sorted(answer.sequence for answer in stream.answers()) == list(range(20))
+        answers = map(pb.RecogniseStreamResponse.FromString, stream.answers())
+        assert sorted(answer.sequence for answer in answers) == list(range(20))
         reading.result(PATIENCE)
 
 

@@ -7,16 +7,14 @@ import subprocess
 import threading
 import weakref
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import pytest
 
 from serving.bundles import WIDER, copy_bundle, fill_with_nan, load_model, rewritten, write_wider_bundle
-from serving.fakes import FAKE_BUNDLE, PATIENCE, FakePipeline, cluster, request, running
+from serving.fakes import PATIENCE, FakePipeline, cluster, fake_model, request, running
 from serving.processes import MODELS
 from shipshape.errors import BundleError, Cancelled, Conflict
 from shipshape.sample import sample_contact
-from shipshape.serving.core import Model
 from shipshape.v1 import shipshape_pb2 as pb
 
 pytestmark = pytest.mark.skipif(
@@ -98,7 +96,7 @@ def test_no_answer_is_dropped_or_mixed_under_load(doors, other):
 
 def test_a_request_keeps_the_bundle_it_began_with():
     second = FakePipeline()
-    with running(load=lambda folder: Model(replace(FAKE_BUNDLE, digest="cd" * 32), second)) as doors:
+    with running(load=lambda folder: fake_model(second, digest="cd" * 32)) as doors:
         held = doors.stub.Recognise.future(request(cluster(), contact_id="hold"), timeout=PATIENCE)
         assert doors.pipeline.entered.acquire(timeout=PATIENCE)
         doors.service.models.swap(MODELS)

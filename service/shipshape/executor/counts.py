@@ -1,13 +1,13 @@
 """What became of all tasks, so that nothing is lost without a trace."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from shipshape.errors import Cancelled, DeadlineExceeded
 from shipshape.executor.ticket import Ticket
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Counts:
     """What became of all tasks; offered = refused + the five outcomes + those still pending."""
 
@@ -25,18 +25,18 @@ class Counts:
         settled = self.completed + self.degraded + self.expired + self.cancelled + self.failed
         return self.offered - self.refused - settled
 
-    def plus(self, outcome: str, count: int) -> "Counts":
-        """The same with `count` more of one field."""
-        return replace(self, **{outcome: getattr(self, outcome) + count})
-
-
-def outcome_of(ticket: Ticket[Any]) -> str:
-    """The field of `Counts` in which a settled ticket is counted."""
-    if ticket.future.cancelled():
-        return "cancelled"
-    error = ticket.future.exception()
-    if error is None:
-        return "degraded" if ticket.degraded else "completed"
-    if isinstance(error, DeadlineExceeded):
-        return "expired"
-    return "cancelled" if isinstance(error, Cancelled) else "failed"
+    def settle(self, ticket: Ticket[Any]) -> None:
+        """Count a ticket that is settled."""
+        if ticket.future.cancelled():
+            self.cancelled += 1
+            return
+        error = ticket.future.exception()
+        if error is None:
+            self.degraded += ticket.degraded
+            self.completed += not ticket.degraded
+        elif isinstance(error, DeadlineExceeded):
+            self.expired += 1
+        elif isinstance(error, Cancelled):
+            self.cancelled += 1
+        else:
+            self.failed += 1

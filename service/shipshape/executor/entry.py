@@ -11,21 +11,50 @@ class Entry:
 
     Attributes:
         left: Seconds that the stages ahead will probably take.
-        since: When it began to wait, or when its stage under way began.
+        since: When it began to wait.
+        began: When a worker first took it up; None before.
+        over: Its worker has nothing more to do with it.
+        hand: The worker that it was given to; None while it waits in the queue.
         timed: What was timed since the costs were last learned from it, with seconds.
     """
 
-    __slots__ = ("_ahead", "_place", "_why", "left", "since", "stage_ms", "task", "ticket", "timed")
+    __slots__ = (
+        "_ahead",
+        "_place",
+        "_why",
+        "began",
+        "hand",
+        "left",
+        "over",
+        "since",
+        "stage_ms",
+        "task",
+        "ticket",
+        "timed",
+    )
 
     def __init__(self, task: Task[Any, Any], clock: Clock) -> None:
         self.task = task
         self.ticket: Ticket[Any] = Ticket(task.deadline, clock)
         self.left = self.since = 0.0
+        self.began: float | None = None
+        self.over = False
+        self.hand: object = None
         self.timed: list[tuple[object, float]] = []
         self.stage_ms: dict[str, float] = {}
         self._ahead: list[float] = []  # seconds expected of each stage ahead and of `finish`
         self._place = 0
         self._why = ""
+
+    @property
+    def place(self) -> int:
+        """Of its rung on the ladder."""
+        return self._place
+
+    @property
+    def why(self) -> str:
+        """It is not on the first rung: a sentence; empty when it is."""
+        return self._why
 
     @property
     def rung(self) -> Rung[Any]:
@@ -68,6 +97,11 @@ class Entry:
         self.stage_ms[stage.name] = seconds * 1e3
         self.timed.append((stage, seconds))
         self.left -= self._ahead.pop(0) if self._ahead else 0.0
+
+    @property
+    def seconds(self) -> float:
+        """That its stages and `finish` took."""
+        return sum(seconds for _, seconds in self.timed)
 
     def ended(self) -> Ended:
         """How it was computed, once every stage has run."""

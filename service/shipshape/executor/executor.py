@@ -1,40 +1,43 @@
-"""Tasks -> bounded queues, one a lane -> one worker thread a core -> answers, in time or not at all.
+"""Tasks -> bounded queues, one a lane -> workers, one a core -> answers, in time or not at all.
 
 The slot in the queue and the worker belong to the work, not to the waiter: a caller that leaves frees its
-queue slot at once, but a worker only when the stage under way has ended. Between two stages a worker gives way to
-work of a more urgent lane, and takes the cheaper rung when the time left is too short for the one it is on.
+queue slot at once, but a worker only when the stage under way has ended. What a worker does is said in `worker`,
+how it is reached in `crew` and `process_crew`.
 """
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 from shipshape.errors import NotReady, Overloaded
 from shipshape.executor.admission import HEADROOM, settle_rungs
 from shipshape.executor.costs import Costs
-from shipshape.executor.counts import Counts, outcome_of
+from shipshape.executor.counts import Counts
+from shipshape.executor.crew import Crew, Hand, ThreadCrew
 from shipshape.executor.deadlines import Deadlines
 from shipshape.executor.entry import Entry
-from shipshape.executor.lanes import UP_TO, Lane, Queues, places
-from shipshape.executor.ticket import Clock, R, Rung, Stage, Task, Ticket, W
+from shipshape.executor.lanes import Lane, Queues, places
+from shipshape.executor.ticket import Clock, R, Rung, Task, Ticket, W
+from shipshape.executor.worker import rehearse
 
-StageObserver = Callable[[str, float], None]  # stage name, seconds; called on the worker for every outcome
-WaitObserver = Callable[[Lane, float], None]  # lane, seconds in the queue; called on the worker
-WEDGED_S = 2.0  # that one stage may take before its worker counts as stuck; usual ones take a millisecond
+StageObserver = Callable[[str, float], None]  # stage name, seconds; called for every outcome
+WaitObserver = Callable[[Lane, float], None]  # lane, seconds in the queue
 
 
 class Executor:
-    """Bounded queues in front of a fixed number of worker threads.
+    """Bounded queues in front of a fixed number of workers.
 
     Args:
-        workers: Worker threads.
+        workers: How many compute at a time.
         queue_limit: Tasks that may wait, beyond those being computed; see `lanes.SHARES`.
         clock: Monotonic seconds.
         on_stage: Told the seconds of each stage that ran, also of work that came to nothing.
-        on_wait: Told the seconds that a task waited, whenever a worker takes it.
+        on_wait: Told the seconds that a task waited, once it was taken up.
     """
 
     def __init__(
@@ -52,19 +55,14 @@ class Executor:
         self._on_stage = on_stage
         self._on_wait = on_wait
         self._lock = threading.RLock()  # guards everything below
-        self._work_there = threading.Condition(self._lock)
         self._idle = threading.Condition(self._lock)
         self._queues: Queues[Entry] = Queues()
-        self._running: set[Entry] = set()
         self._costs = Costs()
+        self._crews: list[Crew] = []
+        self._threads: ThreadCrew | None = None  # made for the first task that names no crew
         self._open = True
         self._counts = Counts()
         self._deadlines = Deadlines(clock)
-        self._threads = [
-            threading.Thread(target=self._work, name=f"worker-{index}", daemon=True) for index in range(workers)
-        ]
-        for thread in self._threads:
-            thread.start()
 
     def submit(self, task: Task[W, R]) -> Ticket[R]:
         """Queue one task; raises as `submit_all` does."""
@@ -82,38 +80,48 @@ class Executor:
         if not entries:
             return []
         with self._lock:
-            self._counts = self._counts.plus("offered", len(entries))
+            self._counts.offered += len(entries)
             try:
                 self._admit(entries)
             except Exception:
-                self._counts = self._counts.plus("refused", len(entries))
+                self._counts.refused += len(entries)
                 raise
+            now = self.clock()
             for entry in entries:
                 self._queues.append(entry.task.lane, entry, entry.left)
-                entry.since = self.clock()
-                entry.ticket.future.add_done_callback(partial(self._settled, entry))
-            self._work_there.notify(len(entries))
+                entry.since = now
+            self._give_out()
         for entry in entries:
+            entry.ticket.future.add_done_callback(partial(self._settled, entry))
             self._deadlines.watch(entry.ticket)
         return [entry.ticket for entry in entries]
 
     def rehearse(self, task: Task[W, R]) -> R:
         """Run a task here and now, only to learn what it costs: it is neither counted nor observed."""
-        entry = Entry(task, self.clock)
-        for stage in task.ladder[0].stages:
-            started = self.clock()
-            stage.run(task.work)
-            entry.passed(stage, self.clock() - started)
-        self._finish(entry)
         with self._lock:
-            self._learn(entry)
-        answer: R = entry.ticket.future.result()
-        return answer
+            return rehearse(task, self._costs, self.clock)
+
+    def learn(self, timed: Iterable[tuple[object, float]], size: float) -> None:
+        """What was timed took so many seconds for work of this size."""
+        with self._lock:
+            for what, seconds in timed:
+                self._costs.learn(what, size, seconds)
+
+    def join(self, crew: Crew) -> None:
+        """Give tasks that name this crew to its workers, until `leave`."""
+        with self._lock:
+            self._crews.append(crew)
+
+    def leave(self, crew: Crew) -> None:
+        """The crew has no workers any more; what it was given was ended by it."""
+        with self._lock:
+            if crew in self._crews:
+                self._crews.remove(crew)
 
     def counts(self) -> Counts:
         """What became of the tasks so far."""
         with self._lock:
-            return self._counts
+            return replace(self._counts)
 
     def promise(self, rung: Rung[Any], size: float, lane: Lane) -> float:
         """Seconds in which new work of this size and lane would be answered on this rung, as admission sees it."""
@@ -127,13 +135,14 @@ class Executor:
 
     @property
     def alive(self) -> bool:
-        """Whether no worker has died."""
-        return not self._open or all(thread.is_alive() for thread in self._threads)
+        """Whether no worker is gone for good."""
+        return not self._open or all(crew.worth_keeping for crew in self._crews)
 
     @property
     def queue_depth(self) -> int:
         """Tasks that wait for a worker."""
-        return len(self._queues)
+        with self._lock:
+            return len(self._queues) + sum(map(_waiting, self._hands()))
 
     @property
     def queue_age(self) -> float:
@@ -143,16 +152,17 @@ class Executor:
 
     @property
     def running(self) -> int:
-        """Tasks that occupy a worker, also those whose caller has left."""
-        return len(self._running)
+        """Workers that are occupied, also by tasks whose caller has left."""
+        with self._lock:
+            return sum(bool(hand.given) for hand in self._hands())
 
     @property
     def sound(self) -> bool:
         """Whether every worker lives and none is stuck in a stage."""
         with self._lock:
             now = self.clock()
-            stuck = any(now - entry.since > WEDGED_S for entry in self._running)
-        return not stuck and all(thread.is_alive() for thread in self._threads)
+            stuck = any(hand.is_stuck(now) for hand in self._hands())
+            return self._open and not stuck and all(crew.whole for crew in self._crews)
 
     def stop(self, drain_s: float) -> bool:
         """Refuse new tasks, finish those admitted for up to `drain_s` seconds, drop the rest.
@@ -162,23 +172,57 @@ class Executor:
         """
         with self._lock:
             self._open = False
-            self._work_there.notify_all()
-            drained = self._idle.wait_for(lambda: not self._queues and not self._running, drain_s)
+            drained = self._idle.wait_for(lambda: not self._queues and not self.running, drain_s)
             left = list(self._queues)
+            crews = list(self._crews)
         for entry in left:
             entry.ticket.fail(NotReady("the service stopped before the answer was computed"))
         self._deadlines.stop()
-        if drained:
-            for thread in self._threads:
-                thread.join()
+        for crew in crews:
+            crew.close()
         return drained
+
+    def gave_up(self, hand: Hand) -> None:
+        """This worker is gone: whatever it had is answered so, and others go on."""
+        with self._lock:
+            lost = list(hand.given.values())
+            hand.given.clear()
+            for entry in lost:
+                entry.over = True
+            self._give_out()
+            self._idle.notify_all()
+        for entry in lost:
+            entry.ticket.fail(NotReady("expected an answer, got a worker that ended before it: ask again"))
+
+    def ended(self, hand: Hand, entry: Entry) -> None:
+        """A worker has done with an entry, whose ticket is settled."""
+        if entry.began is not None:
+            self._on_wait(entry.task.lane, entry.began - entry.since)
+        with self._lock:
+            entry.over = True
+            hand.given.pop(id(entry), None)
+            for timed, seconds in entry.timed:
+                self._costs.learn(timed, entry.task.size, seconds)
+            self._give_out()
+            if not hand.given:
+                self._idle.notify_all()
+
+    def stages_ran(self, stage_ms: Mapping[str, float]) -> None:
+        """Stages ran in a worker that cannot tell so itself."""
+        for name, milliseconds in stage_ms.items():
+            self._on_stage(name, milliseconds / 1e3)
+
+    def give_out(self) -> None:
+        """A worker has come."""
+        with self._lock:
+            self._give_out()
 
     def _admit(self, entries: Sequence[Entry]) -> None:
         """The one place that says yes or no; called with the lock held."""
         if not self._open:
             raise NotReady("expected a running service, got one that is stopping")
         lane, wanted = entries[0].task.lane, len(entries)
-        room = max(0, places(lane, self.queue_limit) - len(self._queues))
+        room = max(0, places(lane, self.queue_limit) - self.queue_depth)
         wait = self._wait(lane)
         if wanted > room:
             raise Overloaded(
@@ -189,88 +233,51 @@ class Executor:
         settle_rungs(entries, self._costs, wait=wait, slack=slack, workers=self.workers)
 
     def _wait(self, lane: Lane) -> float:
-        running = sum(entry.left for entry in self._running if entry.task.lane in UP_TO[lane])
-        return (self._queues.seconds(lane) + running) / self.workers
+        now = self.clock()
+        given = sum(hand.seconds(lane, now) for hand in self._hands())
+        return (self._queues.seconds(lane) + given) / self.workers
 
-    def _work(self) -> None:
-        while (entry := self._next()) is not None:
-            gives_way = self._carry(entry)
-            with self._lock:
-                self._running.discard(entry)
-                self._learn(entry)
-                if gives_way and not entry.ticket.settled:
-                    entry.since = self.clock()
-                    self._queues.put_back(entry.task.lane, entry, entry.left)
-                self._idle.notify_all()
-            del entry  # a waiting worker must not keep the last cluster alive
+    def _hands(self) -> Iterable[Hand]:
+        for crew in self._crews:
+            yield from crew.hands
 
-    def _next(self) -> Entry | None:
-        with self._lock:
-            self._work_there.wait_for(lambda: self._queues or not self._open)
-            if (taken := self._queues.take()) is None:
-                return None
-            lane, entry = taken
-            self._running.add(entry)
-            waited, entry.since = self.clock() - entry.since, self.clock()
-        self._on_wait(lane, waited)
-        return entry
+    def _give_out(self) -> None:
+        """To workers that have room, the most urgent first; called with the lock held."""
+        while (first := self._queues.first()) is not None:
+            lane, entry = first
+            crew = entry.task.crew or self._thread_crew()
+            rooms = [(room, len(hand.given), hand) for hand in crew.hands if (room := hand.room(lane)) is not None]
+            if not rooms:
+                return
+            *_, hand = min(rooms, key=itemgetter(0, 1))
+            self._queues.remove(lane, entry)
+            entry.hand = hand
+            hand.give(entry)
 
-    def _carry(self, entry: Entry) -> bool:
-        """Carry the task to its end, or drop it where nobody wants it any more; True when it has to give way."""
-        try:
-            while (stage := self._next_stage(entry)) is not None:
-                if self._queues.before(entry.task.lane):
-                    return True
-                started = entry.since = self.clock()
-                try:
-                    stage.run(entry.task.work)
-                finally:
-                    seconds = self.clock() - started
-                    entry.passed(stage, seconds)
-                    self._on_stage(stage.name, seconds)
-            if not _unwanted(entry.ticket):
-                self._finish(entry)
-        except Exception as error:
-            entry.ticket.fail(error)
-        except BaseException as error:  # SystemExit and the like must end neither the worker nor the waiter
-            entry.ticket.fail(RuntimeError(f"a stage raised {error!r}"))
-        return False
-
-    def _next_stage(self, entry: Entry) -> Stage[Any] | None:
-        """The stage to run now, on a cheaper rung if time has become short; None when there is nothing to run."""
-        if _unwanted(entry.ticket):
-            return None
-        slack = entry.ticket.remaining()
-        if entry.left > slack:
-            with self._lock:
-                fits = entry.step_down(slack, self._costs)
-                others_wait = len(self._queues) > 0
-            if not fits and others_wait:  # it would only make them late as well
-                entry.ticket.expire()
-                return None
-        return entry.stage
-
-    def _finish(self, entry: Entry) -> None:
-        started = self.clock()
-        answer = entry.task.finish(entry.task.work, entry.ended())
-        entry.timed.append((entry.rung, self.clock() - started))
-        entry.ticket.degraded = entry.degraded
-        entry.ticket.succeed(answer)
-
-    def _learn(self, entry: Entry) -> None:
-        for timed, seconds in entry.timed:
-            self._costs.learn(timed, entry.task.size, seconds)
-        entry.timed.clear()
+    def _thread_crew(self) -> ThreadCrew:
+        if self._threads is None:
+            self._threads = ThreadCrew(
+                self.workers,
+                self._costs,
+                self.clock,
+                on_stage=self._on_stage,
+                on_end=self.ended,
+                others_wait=lambda: len(self._queues) > 0,
+            )
+            self._crews.append(self._threads)
+        return self._threads
 
     def _settled(self, entry: Entry, future: Future[Any]) -> None:
-        outcome = outcome_of(entry.ticket)
         with self._lock:
-            self._counts = self._counts.plus(outcome, 1)
+            self._counts.settle(entry.ticket)
             if self._queues.remove(entry.task.lane, entry):  # left or expired before a worker came
                 self._idle.notify_all()
+            elif not entry.over and isinstance(entry.hand, Hand):
+                entry.hand.take_back(entry)
 
 
-def _unwanted(ticket: Ticket[Any]) -> bool:
-    if not ticket.settled and ticket.remaining() <= 0:
-        ticket.expire()
-    return ticket.settled
+def _waiting(hand: Hand) -> int:
+    """How many entries of a worker wait for it."""
+    if len(hand.given) <= 1:
+        return 0
+    return max(0, sum(not entry.ticket.settled for entry in hand.given.values()) - 1)

@@ -57,14 +57,18 @@ class Queues(Generic[T]):
         self.append(lane, item, seconds)
         self._lanes[lane].move_to_end(item, last=False)
 
-    def take(self) -> tuple[Lane, T] | None:
+    def first(self) -> tuple[Lane, T] | None:
         """The first of the first lane that has any."""
         for lane, queue in self._lanes.items():
             if queue:
-                item = next(iter(queue))
-                self.remove(lane, item)
-                return lane, item
+                return lane, next(iter(queue))
         return None
+
+    def take(self) -> tuple[Lane, T] | None:
+        """The first, taken out."""
+        if (first := self.first()) is not None:
+            self.remove(*first)
+        return first
 
     def remove(self, lane: Lane, item: T) -> bool:
         """Take this one out wherever it stands; whether it was there."""

@@ -5,10 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, runtime_checkable
 
 from shipshape.errors import Cancelled, DeadlineExceeded
 from shipshape.executor.lanes import Lane
+
+if TYPE_CHECKING:
+    from shipshape.executor.crew import Crew
 
 Clock = Callable[[], float]  # monotonic seconds
 W = TypeVar("W")
@@ -63,6 +66,7 @@ class Task(Generic[W, R]):
     deadline: float  # on the executor's clock, seconds; an answer after it is worth nothing
     lane: Lane = Lane.TRACKING
     size: float = 0.0  # what the cost of a stage grows with
+    crew: "Crew | None" = None  # whose workers alone can carry it; None: threads of this process
 
 
 class Ticket(Generic[R]):

@@ -60,6 +60,7 @@ class Clients:
         self._limits = limits
         self._on_refusal = on_refusal
         self._clock = clock
+        self._limited = bool(limits.contacts_per_s or limits.under_way)  # else there is nothing to count
         self._accounts: OrderedDict[str, _Account] = OrderedDict()  # least recently used first
         self._lock = threading.Lock()
 
@@ -73,6 +74,8 @@ class Clients:
         Raises:
             Overloaded: Over a limit; with the seconds after which the rate would let them pass.
         """
+        if not self._limited:
+            return
         with self._lock:
             account = self._account(client)
             refusal = self._over(account, contacts)
@@ -87,6 +90,8 @@ class Clients:
 
     def give_back(self, client: str, contacts: int) -> None:
         """`contacts` that were taken are no longer under way."""
+        if not self._limited:
+            return
         with self._lock:
             self._accounts[client].under_way -= contacts  # none with contacts under way is forgotten
 

@@ -3,76 +3,23 @@
 contact + wishes + deadline -> checks -> executor -> answer
 """
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
-from shipshape.bundle import Bundle
 from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
-from shipshape.executor import Ended, Executor, Lane, Stage, Task, Ticket
+from shipshape.executor import Executor, Lane, Task, Ticket
 from shipshape.serving.age import age_of, time_left
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
+from shipshape.serving.model import Encode, Model, Order, Reply
+from shipshape.serving.shedding import check_room
 from shipshape.serving.timing import summed
 from shipshape.telemetry import DEGRADED, OK, Metrics
-from shipshape.types import Contact, Options, Recognition, Rung
+from shipshape.types import Contact, Options, Rung
 
-Render = Callable[[Contact, Recognition], bytes]  # -> PNG
-
-
-class LadderRung(Protocol):
-    """One rung of a pipeline's ladder and its stages."""
-
-    @property
-    def name(self) -> Rung:
-        """As answers tell it."""
-        ...
-
-    @property
-    def stages(self) -> Sequence[Stage[Any]]:
-        """In their order."""
-        ...
-
-
-@runtime_checkable  # so that shape-checked tests can check it
-class PipelineLike(Protocol):
-    """What the core needs of a pipeline; `Any` is its work item, which only its own stages read."""
-
-    @property
-    def stages(self) -> Sequence[Stage[Any]]:
-        """In the order of the data path."""
-        ...
-
-    def ladder(self, options: Options) -> Sequence[LadderRung]:
-        """The rungs that the caller accepts, the best first."""
-        ...
-
-    def begin(self, contact: Contact, options: Options) -> Any:
-        """The work item; raises InvalidInput when the points cannot be one vessel's cluster."""
-        ...
-
-    def finish(self, work: Any, stage_ms: Mapping[str, float], rung: Rung, rung_reason: str) -> Recognition:
-        """The answer, once every stage of the rung ran."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Model:
-    """A bundle and the pipeline made of it; replaced as one."""
-
-    bundle: Bundle
-    pipeline: PipelineLike
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """One contact's recognition and, if wished, its picture (PNG)."""
-
-    contact: Contact
-    recognition: Recognition
-    png: bytes | None = None
+C = TypeVar("C")
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,15 +33,15 @@ class Capacity:
     workers: int
 
 
-class Scan:
+class Scan(Generic[C]):
     """The contacts of one scan on their way: each a ticket, or the error that refused it."""
 
-    def __init__(self, entries: Sequence[Ticket[Answer] | Exception]) -> None:
+    def __init__(self, entries: Sequence[Ticket[Reply[C]] | Exception]) -> None:
         self._entries = entries
         self.tickets = [entry for entry in entries if isinstance(entry, Ticket)]
 
-    def outcomes(self) -> list[Answer | Exception]:
-        """Wait for all, at most until their deadline: an answer or an error for each contact.
+    def outcomes(self) -> list[Reply[C] | Exception]:
+        """Wait for all, at most until their deadline: a reply or an error for each contact.
 
         Raises:
             DeadlineExceeded, Cancelled, NotReady: when all that was admitted ended so.
@@ -109,23 +56,23 @@ class Scan:
         return outcomes
 
 
-def conclude(scan: Scan, door: str, metrics: Metrics) -> tuple[list[Answer | Fault], dict[str, float]]:
+def conclude(scan: Scan[C], door: str, metrics: Metrics) -> tuple[list[Reply[C] | Fault], dict[str, float]]:
     """Wait for a scan and count its contacts.
 
     Returns:
-        An answer or a fault for each contact, and the milliseconds of each stage over all of them.
+        A reply or a fault for each contact, and the milliseconds of each stage over all of them.
 
     Raises:
         DeadlineExceeded, Cancelled, NotReady: As `Scan.outcomes`.
     """
     outcomes = [fault_of(end) if isinstance(end, Exception) else end for end in scan.outcomes()]
     metrics.count_contacts(door, (end.kind if isinstance(end, Fault) else outcome_of(end) for end in outcomes))
-    return outcomes, summed(end.recognition for end in outcomes if not isinstance(end, Fault))
+    return outcomes, summed(end.stage_ms for end in outcomes if not isinstance(end, Fault))
 
 
-def outcome_of(answer: Answer) -> str:
+def outcome_of(reply: Reply[Any]) -> str:
     """How metrics call it: ok, or degraded when it is of a lower rung."""
-    return OK if answer.recognition.rung is Rung.FULL else DEGRADED
+    return OK if reply.rung is Rung.FULL else DEGRADED
 
 
 class Core:
@@ -134,7 +81,6 @@ class Core:
     Args:
         executor: Carries the stages.
         limits: What one request may bring.
-        render: Draws the picture of an answer.
         on_age: Told how old the points of a request are, seconds, when the caller says it.
     """
 
@@ -142,13 +88,11 @@ class Core:
         self,
         executor: Executor,
         limits: Limits,
-        render: Render,
         *,
         on_age: Callable[[float], None] = lambda seconds: None,
     ) -> None:
         self.limits = limits
         self._executor = executor
-        self._render = render
         self._on_age = on_age
         self._model: Model | None = None
         self._refusal = "expected a running service, got one that is still starting"
@@ -161,17 +105,6 @@ class Core:
     def open(self, model: Model) -> None:
         """Take requests from now on, answered by `model`."""
         self._model = model
-
-    def rehearse(self, model: Model, contact: Contact) -> None:
-        """Run a contact on every rung, so that their costs are known before the first request.
-
-        Raises:
-            Exception: Whatever a stage raises.
-        """
-        for rung in (*Rung, *Rung):
-            wishes = Wishes(Options(lowest_rung=rung))
-            task = self._task(model, contact, wishes, math.inf)
-            self._executor.rehearse(replace(task, ladder=task.ladder[-1:]))
 
     def close(self) -> None:
         """Take no more requests; those under way go on."""
@@ -197,11 +130,7 @@ class Core:
         return model
 
     def capacity(self, points: int, lane: Lane) -> Capacity:
-        """What would be promised now to a contact of so many points in this lane.
-
-        Raises:
-            NotReady: The service is starting or stopping.
-        """
+        """What would be promised now to a contact of so many points in this lane; raises as `model` does."""
         ladder = self.model().pipeline.ladder(Options())
         return Capacity(
             {rung.name: self._executor.promise(rung, points, lane) for rung in ladder},
@@ -215,31 +144,40 @@ class Core:
         """Contacts that wait or are computed, a worker: over 1, there is a queue."""
         return (self._executor.queue_depth + self._executor.running) / self._executor.workers
 
-    def submit(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Ticket[Answer]:
+    def sheds(self, lane: Lane, deadline: float) -> None:
+        """Raises at once what admission would say to even the cheapest contact of this lane; see `shedding`."""
+        check_room(self._executor, lane, deadline)
+
+    def submit(self, model: Model, order: Order[C], deadline: float) -> Ticket[Reply[C]]:
         """Queue one contact; a ticket for its answer.
 
         Args:
             model: From `model`.
-            contact: Level frame.
-            wishes: How to compute, and whether to draw.
+            order: The contact, how to compute and whether to draw.
             deadline: From `deadline_in`.
 
         Raises:
             InvalidInput: Another bundle than the running one, or points that cannot be one vessel's cluster.
             Overloaded, DeadlineExceeded, NotReady: No place, no time, or stopped for good.
         """
-        deadline = self._check(model, wishes, deadline)
-        return self._executor.submit(self._task(model, contact, wishes, deadline))
+        deadline = self._check(model, order.wishes, deadline)
+        return self._executor.submit(model.task(order, deadline))
 
     def submit_scan(
-        self, model: Model, contacts: Sequence[Contact | InvalidInput], wishes: Wishes, deadline: float
-    ) -> Scan:
+        self,
+        model: Model,
+        contacts: Sequence[Contact | InvalidInput],
+        wishes: Wishes,
+        encode: Encode[C],
+        deadline: float,
+    ) -> Scan[C]:
         """Queue all acceptable contacts of a scan, or none; the others keep their own error.
 
         Args:
             model: From `model`.
             contacts: Level frame; an error stands for a contact that could not even be decoded.
             wishes: Hold for all contacts.
+            encode: Of each answer.
             deadline: From `deadline_in`, for all contacts.
 
         Raises:
@@ -247,14 +185,7 @@ class Core:
         """
         check_contacts(len(contacts), self.limits)
         deadline = self._check(model, wishes, deadline)
-        entries: list[Task[Any, Answer] | Exception] = []
-        for contact in contacts:
-            try:
-                entries.append(
-                    self._task(model, contact, wishes, deadline) if isinstance(contact, Contact) else contact
-                )
-            except Exception as error:  # whatever it is, it is this contact's alone
-                entries.append(error)
+        entries = [_task(model, contact, wishes, encode, deadline) for contact in contacts]
         tickets = iter(self._executor.submit_all([entry for entry in entries if isinstance(entry, Task)]))
         return Scan([next(tickets) if isinstance(entry, Task) else entry for entry in entries])
 
@@ -274,24 +205,19 @@ class Core:
         self._on_age(age)
         return min(deadline, self._executor.clock() + time_left(age, wishes))
 
-    def _task(self, model: Model, contact: Contact, wishes: Wishes, deadline: float) -> Task[Any, Answer]:
-        def finish(work: Any, ended: Ended) -> Answer:
-            """On the worker: drawing a picture takes as long as the recognition."""
-            recognition = model.pipeline.finish(work, ended.stage_ms, Rung(ended.rung), ended.why)
-            png = self._render(contact, recognition) if wishes.png else None
-            return Answer(contact, recognition, png)
 
-        return Task(
-            model.pipeline.ladder(wishes.options),
-            model.pipeline.begin(contact, wishes.options),
-            finish,
-            deadline,
-            wishes.lane,
-            size=len(contact.points_level),
-        )
+def _task(
+    model: Model, contact: Contact | InvalidInput, wishes: Wishes, encode: Encode[C], deadline: float
+) -> Task[Any, Reply[C]] | Exception:
+    if not isinstance(contact, Contact):
+        return contact
+    try:
+        return model.task(Order(contact, wishes, encode), deadline)
+    except Exception as error:  # whatever it is, it is this contact's alone
+        return error
 
 
-def _outcome(entry: Ticket[Answer] | Exception) -> Answer | Exception:
+def _outcome(entry: Ticket[Reply[C]] | Exception) -> Reply[C] | Exception:
     if isinstance(entry, Exception):
         return entry
     try:

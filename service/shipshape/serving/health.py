@@ -70,6 +70,11 @@ class Health:
         return State.DRAINED if self._drained and self._phase is State.READY else self._phase
 
     @property
+    def leaving(self) -> bool:
+        """Whether callers should go elsewhere: drained or stopping. Cheap: asked with every answer."""
+        return self._phase is State.STOPPING or (self._drained and self._phase is State.READY)
+
+    @property
     def started(self) -> bool:
         """Whether all doors listen."""
         return self._phase is not State.STARTING

@@ -12,15 +12,14 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from shipshape.bundle import load_bundle
-from shipshape.errors import BundleError, Cancelled
-from shipshape.pipeline import Pipeline
-from shipshape.render import render_png
-from shipshape.serving.core import Model
+from shipshape.errors import BundleError, Cancelled, SettingsError
+from shipshape.providers import Runtime
+from shipshape.serving.compute import in_processes, runtime_of, workers_of
+from shipshape.serving.model import Model
+from shipshape.serving.remote_model import RemoteModel
 from shipshape.serving.service import Addresses, Service
 from shipshape.settings import Settings
 from shipshape.telemetry import configure_logging
-from shipshape.validation import ContactLimits
 
 _logger = logging.getLogger(__name__)
 OK, FAILED, UNUSABLE = 0, 1, 2  # exit codes, as `cli` lists them
@@ -43,25 +42,39 @@ def serve(settings: Settings) -> int:
     ends: queue.SimpleQueue[End] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda received, frame: ends.put(received))
-    load = partial(_load, limits=ContactLimits(max_points=settings.max_points))
+    model: Model | None = None
     try:
+        runtime = runtime_of(settings)
+        load = partial(load_model, settings, runtime)
         model = load(settings.bundle)
-        service = Service(settings, render_png, load=load, on_death=lambda: ends.put(None))
+        workers = workers_of(settings, runtime.provider)
+        service = Service(settings, workers, load=load, on_death=lambda: ends.put(None))
         addresses = service.start()
-    except (BundleError, OSError) as error:
+    except (BundleError, SettingsError, OSError) as error:
+        if model is not None:
+            model.close()
         return _failed(error, str(error))
     _logger.info("live on REST port %d, gRPC port %d", addresses.rest_port, addresses.grpc_port)
     ended_by = _run(service, model, addresses, ends, settings.linger_s)
     if isinstance(ended_by, Exception):
-        name = model.bundle.name
-        return _failed(ended_by, f"expected bundle {name} to answer the built-in contact, got {ended_by!r}")
+        return _failed(ended_by, _why(ended_by, model))
     _logger.info("stopped")
     return FAILED if ended_by is None else OK
 
 
-def _load(folder: Path, limits: ContactLimits) -> Model:
-    bundle = load_bundle(folder)
-    return Model(bundle, Pipeline(bundle, limits))
+def load_model(settings: Settings, runtime: Runtime, folder: Path) -> Model:
+    """The bundle in `folder`, to compute where the settings say; raises BundleError."""
+    if in_processes(settings, runtime.provider):
+        return RemoteModel(folder, settings.max_points, settings.log_level)
+    from shipshape.serving.prepare import load_local  # noqa: PLC0415  # large: only who computes here pays for it
+
+    return load_local(folder, settings.max_points, runtime)
+
+
+def _why(error: Exception, model: Model) -> str:
+    if isinstance(error, BundleError):
+        return str(error)
+    return f"expected bundle {model.bundle.name} to answer the built-in contact, got {error!r}"
 
 
 def _run(
@@ -108,4 +121,4 @@ def _open(service: Service, model: Model, addresses: Addresses, ends: "queue.Sim
 
 def _failed(error: Exception, sentence: str) -> int:
     sys.stderr.write(f"shipshape: {sentence}\n")
-    return UNUSABLE if isinstance(error, BundleError) else FAILED
+    return UNUSABLE if isinstance(error, BundleError | SettingsError) else FAILED

@@ -7,6 +7,7 @@ import struct
 
 HTTP_HEADER = "endpoint-load-metrics"
 GRPC_TRAILER = "endpoint-load-metrics-bin"
+PLAIN_TRAILER = "shipshape-load"  # the number alone: gRPC keeps the other from callers, for balancers of its own
 _TAG = bytes([9 << 3 | 1])  # of xds.data.orca.v3.OrcaLoadReport.application_utilization: field 9, a double
 
 

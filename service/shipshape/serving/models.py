@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shipshape.errors import BundleError, Cancelled, Conflict
-from shipshape.serving.core import Model
+from shipshape.serving.model import Model
 
 Load = Callable[[Path], Model]  # raises BundleError
 
@@ -93,6 +93,7 @@ class Models:
         try:
             model = self._load(folder)
             if model.bundle.digest == before.model.bundle.digest:
+                model.close()
                 return before
             self._try_out(model)
         except (BundleError, Cancelled):

@@ -6,25 +6,23 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 from prometheus_client import CollectorRegistry
 
 from shipshape.budget import Budget
 from shipshape.errors import Cancelled
-from shipshape.executor import Executor, usable_cores
-from shipshape.sample import sample_contact
+from shipshape.executor import Executor
 from shipshape.serving.access import load_access
 from shipshape.serving.admin.control import Control
-from shipshape.serving.core import Core, Model, Render
+from shipshape.serving.core import Core
 from shipshape.serving.encoding import Limits
 from shipshape.serving.grpc.server import GrpcDoor
 from shipshape.serving.health import Health, State
+from shipshape.serving.model import Model
 from shipshape.serving.models import Load, Models, Placed
 from shipshape.serving.operators import OperatorDoors
 from shipshape.serving.rest.app import build_app
 from shipshape.serving.rest.server import RestDoor
 from shipshape.serving.timing import Timeouts
-from shipshape.serving.warmup import warm_up
 from shipshape.settings import Settings
 from shipshape.telemetry import Metrics, watch_workers
 
@@ -58,7 +56,7 @@ class Service:
 
     Args:
         settings: See there.
-        render: Draws the picture of an answer.
+        workers: What computes, processes or threads.
         load: Reads a bundle, for a swap.
         on_death: Called when a door ends without having been asked to.
 
@@ -66,13 +64,10 @@ class Service:
         SettingsError: A file of certificates or tokens cannot be used.
     """
 
-    def __init__(self, settings: Settings, render: Render, *, load: Load, on_death: Callable[[], None]) -> None:
-        cv2.setNumThreads(1)  # the workers are the parallelism; a pool in each of them only adds latency
-        workers = settings.workers or usable_cores()
+    def __init__(self, settings: Settings, workers: int, *, load: Load, on_death: Callable[[], None]) -> None:
         limits = Limits(settings.max_body_bytes, settings.max_points, settings.max_contacts)
         timeouts = Timeouts(settings.default_timeout_ms, settings.budget_ms)
         self._settings = settings
-        self._render = render
         self._turn = threading.Lock()  # to let a model answer, or to leave
         self._leaving = threading.Event()
         self._stopped = threading.Event()
@@ -81,15 +76,21 @@ class Service:
             workers, settings.queue_limit, on_stage=metrics.observe_stage, on_wait=metrics.observe_wait
         )
         watch_workers(self.executor, metrics.registry)
-        self._core = Core(self.executor, limits, render, on_age=metrics.observe_age)
+        self._core = Core(self.executor, limits, on_age=metrics.observe_age)
         self.health = Health(self.executor)
         self.models = Models(load, self._try_out, self._publish)
         access = load_access(settings, metrics.count_client_refusal)
         self._grpc = GrpcDoor(
-            self._core, metrics, timeouts, access, self.health, waiting=settings.queue_limit + workers
+            self._core,
+            metrics,
+            timeouts,
+            access,
+            self.health,
+            waiting=settings.queue_limit + workers,
+            shared=settings.share_ports,
         )
         app = build_app(self._core, metrics, timeouts, access, self.health)
-        self._rest = RestDoor(app, access.tls, on_death=on_death)
+        self._rest = RestDoor(app, access.tls, on_death=on_death, shared=settings.share_ports)
         root = settings.bundle_root or settings.bundle.absolute().parent
         self._operators = OperatorDoors(
             settings,
@@ -151,8 +152,7 @@ class Service:
         self._stopped.set()
 
     def _try_out(self, model: Model) -> None:
-        warm_up(model, self._render, self._leaving.is_set)
-        self._core.rehearse(model, sample_contact())
+        model.start(self.executor, self._leaving.is_set)
 
     def _publish(self, model: Model) -> None:
         with self._turn:

@@ -3,8 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from shipshape.types import Recognition
-
 LONGEST_MS = 3_600_000.0  # that any request may take, whatever its caller says
 
 
@@ -21,10 +19,10 @@ def server_timing(stage_ms: Mapping[str, float]) -> str:
     return ", ".join(f"{stage};dur={milliseconds:.3f}" for stage, milliseconds in stage_ms.items())
 
 
-def summed(recognitions: Iterable[Recognition]) -> dict[str, float]:
+def summed(contacts: Iterable[Mapping[str, float]]) -> dict[str, float]:
     """Milliseconds of each stage over all contacts of a scan."""
     total: dict[str, float] = {}
-    for recognition in recognitions:
-        for stage, milliseconds in recognition.stage_ms.items():
+    for stage_ms in contacts:
+        for stage, milliseconds in stage_ms.items():
             total[stage] = total.get(stage, 0.0) + milliseconds
     return total

@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike
 
 from shipshape.errors import BundleError, Cancelled
 from shipshape.sample import sample_contact
-from shipshape.serving.core import Model, Render
+from shipshape.serving.model import PipelineLike, Render
 from shipshape.types import Contact, ImageMethod, Options, Preset, Recognition, Rung
 
 
-def warm_up(model: Model, render: Render, stopping: Callable[[], bool]) -> None:
+def warm_up(pipeline: PipelineLike, render: Render, stopping: Callable[[], bool]) -> None:
     """Run every preset and image method once on the built-in contact.
 
     Raises:
@@ -20,19 +20,19 @@ def warm_up(model: Model, render: Render, stopping: Callable[[], bool]) -> None:
         Exception: Whatever a stage raises.
     """
     contact = sample_contact()
-    recognition = _run(model, contact, Options(preset=Preset.BEST), stopping)
+    recognition = _run(pipeline, contact, Options(preset=Preset.BEST), stopping)
     for method in ImageMethod:
-        _run(model, contact, Options(preset=Preset.PAPER, image_method=method), stopping)
+        _run(pipeline, contact, Options(preset=Preset.PAPER, image_method=method), stopping)
     render(contact, recognition)
 
 
-def _run(model: Model, contact: Contact, options: Options, stopping: Callable[[], bool]) -> Recognition:
-    work = model.pipeline.begin(contact, options)
-    for stage in model.pipeline.stages:
+def _run(pipeline: PipelineLike, contact: Contact, options: Options, stopping: Callable[[], bool]) -> Recognition:
+    work = pipeline.begin(contact, options)
+    for stage in pipeline.stages:
         if stopping():
             raise Cancelled("expected to end the warm-up, got a signal to stop")
         stage.run(work)
-    recognition = model.pipeline.finish(work, {}, Rung.FULL, "")
+    recognition = pipeline.finish(work, {}, Rung.FULL, "")
     _check_finite(recognition, options)
     return recognition
 

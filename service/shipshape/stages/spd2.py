@@ -10,7 +10,7 @@ elevation (zenith first) x 32 columns of azimuth (from -pi). Five channels in [0
 """
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float32, UInt8
 
 from shipshape import kernels
 
@@ -28,3 +28,9 @@ def describe(
     images[:, STRATA] = np.where(farthest > 0, 1 - nearest / radius, 0)
     images[:, STRATA + 1] = (farthest - nearest) / radius
     return images
+
+
+def to_grey(images: Float32[np.ndarray, "k 5 16 32"]) -> UInt8[np.ndarray, "k 5 16 32"]:
+    """The images in bytes, for people: 0 to 1 becomes 0 to 255."""
+    grey: UInt8[np.ndarray, "k 5 16 32"] = np.rint(images * 255).astype(np.uint8)
+    return grey

@@ -90,16 +90,22 @@ ERROR_KIND_INTERNAL: ErrorKind
 ERROR_KIND_UNAUTHENTICATED: ErrorKind
 
 class Contact(_message.Message):
-    __slots__ = ("contact_id", "points", "sensor_height_m", "own_true_heading_deg")
+    __slots__ = ("contact_id", "points", "sensor_height_m", "own_true_heading_deg", "points_int16", "origin", "scale")
     CONTACT_ID_FIELD_NUMBER: _ClassVar[int]
     POINTS_FIELD_NUMBER: _ClassVar[int]
     SENSOR_HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
     OWN_TRUE_HEADING_DEG_FIELD_NUMBER: _ClassVar[int]
+    POINTS_INT16_FIELD_NUMBER: _ClassVar[int]
+    ORIGIN_FIELD_NUMBER: _ClassVar[int]
+    SCALE_FIELD_NUMBER: _ClassVar[int]
     contact_id: str
     points: bytes
     sensor_height_m: float
     own_true_heading_deg: float
-    def __init__(self, contact_id: _Optional[str] = ..., points: _Optional[bytes] = ..., sensor_height_m: _Optional[float] = ..., own_true_heading_deg: _Optional[float] = ...) -> None: ...
+    points_int16: bytes
+    origin: Point
+    scale: float
+    def __init__(self, contact_id: _Optional[str] = ..., points: _Optional[bytes] = ..., sensor_height_m: _Optional[float] = ..., own_true_heading_deg: _Optional[float] = ..., points_int16: _Optional[bytes] = ..., origin: _Optional[_Union[Point, _Mapping]] = ..., scale: _Optional[float] = ...) -> None: ...
 
 class Options(_message.Message):
     __slots__ = ("preset", "image_method", "bundle", "include_restored", "include_images", "include_png", "lane", "lowest_rung", "captured_at", "max_age_ms")
@@ -196,7 +202,7 @@ class ContactError(_message.Message):
     def __init__(self, kind: _Optional[_Union[ErrorKind, str]] = ..., message: _Optional[str] = ...) -> None: ...
 
 class Recognition(_message.Message):
-    __slots__ = ("contact_id", "vessel", "probability", "probabilities", "unknown", "heading", "heading_std", "bow_probability", "aspect_deg", "true_heading_deg", "box", "measured_points", "inferred_points", "keypoints", "rung", "preset", "image_method", "bundle", "stages", "restored", "images", "rendered_png", "reasons", "rung_reason")
+    __slots__ = ("contact_id", "vessel", "probability", "probabilities", "unknown", "heading", "heading_std", "bow_probability", "aspect_deg", "true_heading_deg", "box", "measured_points", "inferred_points", "keypoints", "rung", "preset", "image_method", "bundle", "stages", "restored", "images", "rendered_png", "reasons", "rung_reason", "descriptors")
     CONTACT_ID_FIELD_NUMBER: _ClassVar[int]
     VESSEL_FIELD_NUMBER: _ClassVar[int]
     PROBABILITY_FIELD_NUMBER: _ClassVar[int]
@@ -221,6 +227,7 @@ class Recognition(_message.Message):
     RENDERED_PNG_FIELD_NUMBER: _ClassVar[int]
     REASONS_FIELD_NUMBER: _ClassVar[int]
     RUNG_REASON_FIELD_NUMBER: _ClassVar[int]
+    DESCRIPTORS_FIELD_NUMBER: _ClassVar[int]
     contact_id: str
     vessel: str
     probability: float
@@ -245,7 +252,8 @@ class Recognition(_message.Message):
     rendered_png: bytes
     reasons: _containers.RepeatedScalarFieldContainer[Reason]
     rung_reason: str
-    def __init__(self, contact_id: _Optional[str] = ..., vessel: _Optional[str] = ..., probability: _Optional[float] = ..., probabilities: _Optional[_Iterable[_Union[NamedProbability, _Mapping]]] = ..., unknown: _Optional[bool] = ..., heading: _Optional[float] = ..., heading_std: _Optional[float] = ..., bow_probability: _Optional[float] = ..., aspect_deg: _Optional[float] = ..., true_heading_deg: _Optional[float] = ..., box: _Optional[_Union[Box, _Mapping]] = ..., measured_points: _Optional[int] = ..., inferred_points: _Optional[int] = ..., keypoints: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., rung: _Optional[str] = ..., preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., restored: _Optional[_Union[RestoredCloud, _Mapping]] = ..., images: _Optional[_Union[ImagePair, _Mapping]] = ..., rendered_png: _Optional[bytes] = ..., reasons: _Optional[_Iterable[_Union[Reason, str]]] = ..., rung_reason: _Optional[str] = ...) -> None: ...
+    descriptors: _containers.RepeatedCompositeFieldContainer[Image]
+    def __init__(self, contact_id: _Optional[str] = ..., vessel: _Optional[str] = ..., probability: _Optional[float] = ..., probabilities: _Optional[_Iterable[_Union[NamedProbability, _Mapping]]] = ..., unknown: _Optional[bool] = ..., heading: _Optional[float] = ..., heading_std: _Optional[float] = ..., bow_probability: _Optional[float] = ..., aspect_deg: _Optional[float] = ..., true_heading_deg: _Optional[float] = ..., box: _Optional[_Union[Box, _Mapping]] = ..., measured_points: _Optional[int] = ..., inferred_points: _Optional[int] = ..., keypoints: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., rung: _Optional[str] = ..., preset: _Optional[_Union[Preset, str]] = ..., image_method: _Optional[_Union[ImageMethod, str]] = ..., bundle: _Optional[str] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., restored: _Optional[_Union[RestoredCloud, _Mapping]] = ..., images: _Optional[_Union[ImagePair, _Mapping]] = ..., rendered_png: _Optional[bytes] = ..., reasons: _Optional[_Iterable[_Union[Reason, str]]] = ..., rung_reason: _Optional[str] = ..., descriptors: _Optional[_Iterable[_Union[Image, _Mapping]]] = ...) -> None: ...
 
 class NamedProbability(_message.Message):
     __slots__ = ("name", "probability")

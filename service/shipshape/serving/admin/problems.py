@@ -28,7 +28,7 @@ def add_refusals(app: FastAPI) -> None:
 
 
 def _refusal(request: Request, error: Exception) -> Response:
-    identify(request)
+    identify(request.scope)
     status, name = next(STATUS[kind] for kind in type(error).__mro__ if kind in STATUS)
     answer = document(status, title=name.replace("_", " ").capitalize(), detail=str(error), error=name)
     if status == 401:

@@ -1,16 +1,16 @@
 """Messages of shipshape.v1 <-> the core's own values; units and frames are the same on both sides."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float32, UInt8
 
 from shipshape.budget import Report
 from shipshape.errors import InvalidInput
 from shipshape.executor import Lane
-from shipshape.serving.core import Answer, Capacity, Model
+from shipshape.serving.core import Capacity
 from shipshape.serving.encoding import (
     Limits,
     Wishes,
@@ -20,7 +20,9 @@ from shipshape.serving.encoding import (
     pack,
     points_from_bytes,
 )
+from shipshape.serving.encoding_int16 import points_from_int16
 from shipshape.serving.faults import Fault, FaultKind
+from shipshape.serving.model import Answer, Model, Reply
 from shipshape.types import Box, Contact, ImageMethod, Options, Preset, Reason, RestoredCloud, Rung
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -48,7 +50,7 @@ _IMAGE_METHOD_NUMBERS = {method: number for number, method in IMAGE_METHODS.item
 def to_contact(message: pb.Contact, limits: Limits) -> Contact:
     """The contact of a message; raises InvalidInput for what `encoding` refuses."""
     return make_contact(
-        points_from_bytes(message.points, limits),
+        _points(message, limits),
         contact_id=message.contact_id,
         sensor_height_m=message.sensor_height_m if message.HasField("sensor_height_m") else None,
         own_true_heading_deg=message.own_true_heading_deg if message.HasField("own_true_heading_deg") else None,
@@ -122,28 +124,44 @@ def from_answer(answer: Answer, wishes: Wishes) -> pb.Recognition:
     if wishes.images and found.images is not None:
         images = pb.ImagePair(before=_image(found.images.before), after=_image(found.images.after))
         message.images.CopyFrom(images)
+        message.descriptors.extend(map(_image, np.moveaxis(found.descriptors, 1, -1)))
     return message
 
 
-def from_outcomes(
-    contact_ids: Iterable[str], outcomes: Sequence[Answer | Fault], wishes: Wishes
-) -> pb.RecogniseScanResponse:
-    """The message of a scan's outcomes, in the order of its contacts."""
-    response = pb.RecogniseScanResponse()
-    add_results(response.results, contact_ids, outcomes, wishes)
-    return response
+def encode_single(answer: Answer, wishes: Wishes) -> bytes:
+    """The bytes of a RecogniseResponse; on the worker."""
+    return pb.RecogniseResponse(recognition=from_answer(answer, wishes)).SerializeToString()
 
 
-def add_results(
-    results: Any, contact_ids: Iterable[str], outcomes: Sequence[Answer | Fault], wishes: Wishes
-) -> None:
-    """Put the outcomes into the repeated ContactResult of a message, in the order of its contacts."""
+def encode_in_scan(answer: Answer, wishes: Wishes) -> bytes:
+    """The bytes of a RecogniseScanResponse with this result alone; on the worker."""
+    return pb.RecogniseScanResponse(results=[_result(answer, wishes)]).SerializeToString()
+
+
+def encode_in_stream(answer: Answer, wishes: Wishes) -> bytes:
+    """The bytes of a RecogniseStreamResponse with this result alone; on the worker."""
+    return pb.RecogniseStreamResponse(results=[_result(answer, wishes)]).SerializeToString()
+
+
+def joined(
+    response: Callable[..., Any], contact_ids: Iterable[str], outcomes: Sequence[Reply[bytes] | Fault]
+) -> bytes:
+    """The bytes of one `response` with the results of all outcomes, in the order of the contacts.
+
+    The bytes of messages one after the other are those of the message with the repeated fields of all.
+    """
+    parts = []
     for contact_id, outcome in zip(contact_ids, outcomes, strict=True):
-        result = results.add(contact_id=contact_id)
         if isinstance(outcome, Fault):
-            result.error.CopyFrom(from_fault(outcome))
+            result = pb.ContactResult(contact_id=contact_id, error=from_fault(outcome))
+            parts.append(response(results=[result]).SerializeToString())
         else:
-            result.recognition.CopyFrom(from_answer(outcome, wishes))
+            parts.append(outcome.content)
+    return b"".join(parts)
+
+
+def _result(answer: Answer, wishes: Wishes) -> pb.ContactResult:
+    return pb.ContactResult(contact_id=answer.contact.contact_id, recognition=from_answer(answer, wishes))
 
 
 def from_fault(fault: Fault) -> pb.ContactError:
@@ -197,6 +215,15 @@ def from_capacity(capacity: Capacity, budget: Report) -> pb.GetCapacityResponse:
 def to_lane(number: int) -> Lane:
     """The lane of its number; raises InvalidInput for one that the contract does not know."""
     return _numbered(LANES, number, "lane", Lane.TRACKING)
+
+
+def _points(message: pb.Contact, limits: Limits) -> Float32[np.ndarray, "n 3"]:
+    if not message.points_int16:
+        return points_from_bytes(message.points, limits)
+    if message.points:
+        raise InvalidInput("expected one of points and points_int16, got both")
+    origin = message.origin
+    return points_from_int16(message.points_int16, (origin.x, origin.y, origin.z), message.scale, limits)
 
 
 def _box(box: Box) -> pb.Box:

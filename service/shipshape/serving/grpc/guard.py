@@ -5,7 +5,6 @@ from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NoReturn
 
 import grpc
@@ -18,8 +17,7 @@ from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.serving.grpc.callers import client_of
 from shipshape.serving.oip.models import UnknownModel
-from shipshape.telemetry import DEGRADED, SCAN, SINGLE, STREAM, Metrics, Outcome, new_request_id, request_id
-from shipshape.types import Rung
+from shipshape.telemetry import SCAN, SINGLE, STREAM, Metrics, Outcome, new_request_id, request_id
 from shipshape.v1 import shipshape_pb2 as pb
 
 STATUS = {
@@ -34,8 +32,6 @@ STATUS = {
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
-Parse = Callable[[bytes], Any]
-Write = Callable[[Any], bytes]
 StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Generator[Any, None, None]]
 
 
@@ -90,12 +86,15 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         method = self._of.methods[name]
         # Neither deserializer nor serializer: gRPC would answer INTERNAL to bytes that do not parse, which is not
         # our fault, and to an answer for which memory is short, without a word in the metrics.
-        parse, write = handler.request_deserializer, partial(_written, handler.response_serializer)
         if handler.request_streaming:
-            return grpc.stream_stream_rpc_method_handler(self._guarded_stream(handler.stream_stream, parse, write))
-        return grpc.unary_unary_rpc_method_handler(self._guarded(handler.unary_unary, parse, write, method))
+            return grpc.stream_stream_rpc_method_handler(
+                self._guarded_stream(handler.stream_stream, handler.request_deserializer)
+            )
+        return grpc.unary_unary_rpc_method_handler(
+            self._guarded(handler.unary_unary, handler.request_deserializer, method)
+        )
 
-    def _guarded(self, behaviour: Behaviour, parse: Parse, write: Write, method: str) -> Behaviour:
+    def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
         def call(raw: bytes, context: grpc.ServicerContext) -> Any:
             """One call: its id, its time, its share, and its refusal in our words."""
             identify(context)
@@ -109,27 +108,23 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     with self._access.clients.share(client_of(context, self._access)) as share:
                         current_call.set(Call(outcome, share))
                         share.take(min(outcome.contacts, self._limits.max_contacts))
-                        response = behaviour(message, context)
-                        written = write(response)
+                        return _written(behaviour(message, context))
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
                     unknown = isinstance(error, UnknownModel)
                     refuse(context, fault, grpc.StatusCode.NOT_FOUND if unknown else None)
-                if method == SINGLE and response.recognition.rung != Rung.FULL:
-                    outcome.kind = DEGRADED
-                return written
 
         return call
 
-    def _guarded_stream(self, behaviour: StreamBehaviour, parse: Parse, write: Write) -> StreamBehaviour:
+    def _guarded_stream(self, behaviour: StreamBehaviour, parse: Callable[[bytes], Any]) -> StreamBehaviour:
         def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Generator[Any, None, None]:
             """One stream; what its messages get wrong is their own answers' matter."""
             identify(context)
             set_trailing(context)
             try:
                 with closing(behaviour(self._messages(raws, parse), context)) as answers:
-                    yield from map(write, answers)
+                    yield from map(_written, answers)
             except Exception as error:  # a message that is wrong is answered and counted in the stream
                 fault = fault_of(error)
                 with self._metrics.request(self._of.door, STREAM) as outcome:
@@ -138,7 +133,7 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 
         return call
 
-    def _messages(self, raws: Iterator[bytes], parse: Parse) -> Iterator[Any]:
+    def _messages(self, raws: Iterator[bytes], parse: Callable[[bytes], Any]) -> Iterator[Any]:
         for raw in raws:
             check_body(len(raw), self._limits)
             yield _parsed(raw, parse, self._of.service)
@@ -147,8 +142,8 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
 def identify(context: grpc.ServicerContext) -> None:
     """Give the call its id, in its trailing metadata and in the log: the caller's own, else a fresh one."""
     metadata = dict(context.invocation_metadata() or ())
-    proposed = metadata.get("x-request-id", "")
-    new_request_id(proposed if isinstance(proposed, str) else "")
+    proposed, traceparent = metadata.get("x-request-id", ""), metadata.get("traceparent", "")
+    new_request_id(proposed if isinstance(proposed, str) else "", str(traceparent))
 
 
 def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str | bytes]) -> None:
@@ -166,17 +161,18 @@ def refuse(context: grpc.ServicerContext, fault: Fault, status: grpc.StatusCode 
     raise AssertionError("unreachable: abort raises")
 
 
-def _parsed(raw: bytes, parse: Parse, service: str) -> Any:
+def _written(response: Any) -> bytes:
+    """The response, unless a worker has encoded it already."""
+    try:
+        return response if isinstance(response, bytes) else response.SerializeToString()
+    except EncodeError as error:  # all that protobuf says when memory is short, or an answer over its 2 GiB
+        raise MemoryError("no memory to write the answer") from error
+
+
+def _parsed(raw: bytes, parse: Callable[[bytes], Any], service: str) -> Any:
     try:
         return parse(raw)
     except DecodeError as error:
         raise InvalidInput(
             f"expected a message of {service.rpartition('.')[0]}, got {len(raw)} bytes that do not parse as one"
         ) from error
-
-
-def _written(serialise: Write, response: Any) -> bytes:
-    try:
-        return serialise(response)
-    except EncodeError as error:  # all that protobuf says when memory is short, or an answer over its 2 GiB
-        raise MemoryError("no memory to write the answer") from error

@@ -25,6 +25,9 @@ from shipshape.v1 import shipshape_pb2_grpc
 SERVICES = (V1.service, GUARDED.service)
 LIVE = "live"  # the name under which grpc.health.v1 tells whether the process is worth keeping
 SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and for reflection streams
+PING_INTERVAL_MS = (
+    20_000  # that clients may ping at when idle; gRPC's own five minutes outlast what modems remember
+)
 MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that the refusal is ours, in one sentence
 
 
@@ -40,10 +43,19 @@ class GrpcDoor:
         waiting: Contacts that may wait or be computed. Each may hold a thread of its own, so that the
             executor's queue, which is bounded and refuses, is where they wait; streams of contacts and of
             reflection, which hold a thread each as well, are bounded for the same reason.
+        shared: Other processes may listen on the same port; the system spreads connections among them.
     """
 
     def __init__(
-        self, core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, health: Health, *, waiting: int
+        self,
+        core: Core,
+        metrics: Metrics,
+        timeouts: Timeouts,
+        access: Access,
+        health: Health,
+        *,
+        waiting: int,
+        shared: bool,
     ) -> None:
         limits = core.limits
         self._tls = access.tls
@@ -55,9 +67,11 @@ class GrpcDoor:
                 *(Guard(guarded, metrics, limits, access) for guarded in (V1, GUARDED)),
             ],
             options=[
-                ("grpc.so_reuseport", 0),  # a second service on the same port must fail, not share it
+                ("grpc.so_reuseport", int(shared)),  # unasked, a second service on the same port must fail
                 ("grpc.max_receive_message_length", limits.max_body_bytes + MESSAGE_SLACK),
                 ("grpc.max_send_message_length", -1),
+                ("grpc.http2.min_ping_interval_without_data_ms", PING_INTERVAL_MS),
+                ("grpc.keepalive_permit_without_calls", 1),
             ],
         )
         self._streams = Streams(core, metrics, timeouts, access)

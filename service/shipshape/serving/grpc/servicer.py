@@ -7,12 +7,13 @@ from typing import Any
 import grpc
 
 from shipshape.executor import Ticket
-from shipshape.serving.core import Core, conclude
+from shipshape.serving.core import Core, conclude, outcome_of
 from shipshape.serving.encoding import check_contacts
 from shipshape.serving.grpc import convert
-from shipshape.serving.grpc.guard import set_trailing
+from shipshape.serving.grpc.guard import current_call, set_trailing
 from shipshape.serving.grpc.streams import STREAMS, Streams
-from shipshape.serving.load_report import GRPC_TRAILER, as_message
+from shipshape.serving.load_report import GRPC_TRAILER, PLAIN_TRAILER, as_message
+from shipshape.serving.model import Order
 from shipshape.serving.timing import LONGEST_MS, Timeouts, server_timing
 from shipshape.telemetry import Metrics
 from shipshape.v1 import shipshape_pb2 as pb
@@ -23,7 +24,10 @@ NEVER_S = 365 * 86400.0  # gRPC hands out centuries when the caller set no deadl
 
 
 class Servicer(pb_grpc.ShipshapeServicer):
-    """The methods of the contract; errors are the guard's matter."""
+    """The methods of the contract; errors are the guard's matter.
+
+    Answers with recognitions are the bytes that the workers encoded; the guard passes bytes on as they are.
+    """
 
     def __init__(self, core: Core, metrics: Metrics, timeouts: Timeouts, streams: Streams) -> None:
         self._core = core
@@ -31,34 +35,36 @@ class Servicer(pb_grpc.ShipshapeServicer):
         self._timeouts = timeouts
         self._streams = streams
 
-    def Recognise(self, request: pb.RecogniseRequest, context: grpc.ServicerContext) -> pb.RecogniseResponse:
+    def Recognise(self, request: pb.RecogniseRequest, context: grpc.ServicerContext) -> bytes:
         """One contact."""
         model = self._core.model()
         wishes = convert.to_wishes(request.options)
         contact = convert.to_contact(request.contact, self._core.limits)
-        ticket = self._core.submit(model, contact, wishes, deadline_of(self._core, self._timeouts, context))
+        order = Order(contact, wishes, convert.encode_single)
+        ticket = self._core.submit(model, order, deadline_of(self._core, self._timeouts, context))
         cancel_with(context, [ticket])
-        answer = ticket.result()
-        set_timing(context, answer.recognition.stage_ms, self._core.load())
-        return pb.RecogniseResponse(recognition=convert.from_answer(answer, wishes))
+        reply = ticket.result()
+        current_call.get().outcome.kind = outcome_of(reply)
+        set_timing(context, reply.stage_ms, self._core.load())
+        return bytes(reply.content)
 
-    def RecogniseScan(
-        self, request: pb.RecogniseScanRequest, context: grpc.ServicerContext
-    ) -> pb.RecogniseScanResponse:
+    def RecogniseScan(self, request: pb.RecogniseScanRequest, context: grpc.ServicerContext) -> bytes:
         """Many contacts of one scan."""
         model = self._core.model()
         wishes = convert.to_wishes(request.options)
         check_contacts(len(request.contacts), self._core.limits)
         contacts = convert.to_contacts(request.contacts, self._core.limits)
-        scan = self._core.submit_scan(model, contacts, wishes, deadline_of(self._core, self._timeouts, context))
+        deadline = deadline_of(self._core, self._timeouts, context)
+        scan = self._core.submit_scan(model, contacts, wishes, convert.encode_in_scan, deadline)
         cancel_with(context, scan.tickets)
         outcomes, stage_ms = conclude(scan, "grpc", self._metrics)
         set_timing(context, stage_ms, self._core.load())
-        return convert.from_outcomes((contact.contact_id for contact in request.contacts), outcomes, wishes)
+        contact_ids = (contact.contact_id for contact in request.contacts)
+        return convert.joined(pb.RecogniseScanResponse, contact_ids, outcomes)
 
     def RecogniseStream(
         self, request_iterator: Iterator[pb.RecogniseStreamRequest], context: grpc.ServicerContext
-    ) -> Iterator[pb.RecogniseStreamResponse]:
+    ) -> Iterator[bytes]:
         """Many messages in one long call."""
         return self._streams.serve(request_iterator, context)
 
@@ -106,4 +112,6 @@ def cancel_with(context: grpc.ServicerContext, tickets: Sequence[Ticket[Any]]) -
 
 def set_timing(context: grpc.ServicerContext, stage_ms: Mapping[str, float], load: float) -> None:
     """Trailing metadata: the milliseconds of each stage, the load and the request's id."""
-    set_trailing(context, ("server-timing", server_timing(stage_ms)), (GRPC_TRAILER, as_message(load)))
+    current_call.get().outcome.computed(stage_ms)
+    loads = ((GRPC_TRAILER, as_message(load)), (PLAIN_TRAILER, f"{load:.3f}"))
+    set_trailing(context, ("server-timing", server_timing(stage_ms)), *loads)

@@ -36,7 +36,7 @@ class _Message:
     span: ExitStack  # its time in the metrics, until it is closed
     outcome: Outcome
     wishes: Wishes = field(default_factory=Wishes)
-    scan: Scan = field(default_factory=lambda: Scan([]))
+    scan: Scan[bytes] = field(default_factory=lambda: Scan([]))
     refusal: Exception | None = None  # of the message as a whole
     deadline: float = math.inf  # on the executor's clock
     unsettled: int = 1  # tickets, and the submission itself
@@ -84,7 +84,7 @@ class Stream:
         else:
             self.end(None)
 
-    def answers(self) -> Iterator[pb.RecogniseStreamResponse]:
+    def answers(self) -> Iterator[bytes]:
         """The response to each message as soon as it is there.
 
         Raises:
@@ -154,7 +154,7 @@ class Stream:
         check_contacts(len(request.contacts), self._core.limits)
         message.span.enter_context(self._share()).take(len(request.contacts))
         contacts = convert.to_contacts(request.contacts, self._core.limits)
-        scan = self._core.submit_scan(model, contacts, message.wishes, deadline)
+        scan = self._core.submit_scan(model, contacts, message.wishes, convert.encode_in_stream, deadline)
         with self._changed:
             message.scan, message.deadline = scan, deadline
             message.unsettled += len(scan.tickets)
@@ -193,21 +193,22 @@ class Stream:
                     for ticket in message.scan.tickets:
                         ticket.expire()  # does nothing to one that has its answer
 
-    def _answer(self, message: _Message) -> pb.RecogniseStreamResponse:
-        response = pb.RecogniseStreamResponse(sequence=message.sequence)
+    def _answer(self, message: _Message) -> bytes:
         with message.span:
             try:
                 if message.refusal is not None:
                     raise message.refusal
                 outcomes, stage_ms = conclude(message.scan, "grpc", self._metrics)
-                convert.add_results(response.results, message.contact_ids, outcomes, message.wishes)
-                response.stages.extend(convert.from_stage_ms(stage_ms))
+                message.outcome.computed(stage_ms)
+                results = convert.joined(pb.RecogniseStreamResponse, message.contact_ids, outcomes)
+                stages = convert.from_stage_ms(stage_ms)
+                rest = pb.RecogniseStreamResponse(sequence=message.sequence, stages=stages)
+                return results + rest.SerializeToString()
             except Exception as error:
                 fault = fault_of(error)
                 message.outcome.kind = fault.kind
-                del response.results[:]
-                response.error.CopyFrom(convert.from_fault(fault))
-        return response
+                refused = pb.RecogniseStreamResponse(sequence=message.sequence, error=convert.from_fault(fault))
+                return refused.SerializeToString()
 
     def _release(self, message: _Message) -> None:
         with self._changed:

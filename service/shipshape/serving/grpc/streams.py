@@ -15,7 +15,6 @@ from shipshape.serving.grpc.callers import client_of
 from shipshape.serving.grpc.stream import Stream
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
-from shipshape.v1 import shipshape_pb2 as pb
 
 STREAMS = 32  # at a time; each holds two threads, also while its caller is silent
 
@@ -39,9 +38,7 @@ class Streams:
         self._open: set[Stream] = set()
         self._stopping = False
 
-    def serve(
-        self, requests: Iterator[Any], context: grpc.ServicerContext
-    ) -> Iterator[pb.RecogniseStreamResponse]:
+    def serve(self, requests: Iterator[Any], context: grpc.ServicerContext) -> Iterator[bytes]:
         """The responses to the messages of one call.
 
         Raises:

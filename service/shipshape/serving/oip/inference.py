@@ -6,11 +6,12 @@ from typing import Any
 
 from shipshape.executor import Lane, Ticket
 from shipshape.serving.clients import Share
-from shipshape.serving.core import Answer, Core, Model, Scan, conclude, outcome_of
+from shipshape.serving.core import Core, Scan, conclude, outcome_of
+from shipshape.serving.model import Answer, Model, Order, Reply
 from shipshape.serving.oip.convention import count_contacts, to_contacts
 from shipshape.serving.oip.models import classes_of
 from shipshape.serving.oip.parameters import timeout_s, to_wishes
-from shipshape.serving.oip.results import RESTORED, output_specs, to_tensors
+from shipshape.serving.oip.results import RESTORED, encode, output_specs, to_tensors
 from shipshape.serving.oip.tensors import Tensor, TensorSpec
 from shipshape.telemetry import Metrics, Outcome
 from shipshape.types import Contact
@@ -31,11 +32,11 @@ class Inference:
 
     specs: Sequence[TensorSpec]
     contact_ids: Sequence[str]
-    work: Ticket[Answer] | Scan
+    work: Ticket[Reply[Answer]] | Scan[Answer]
     classes: int
 
     @property
-    def tickets(self) -> list[Ticket[Answer]]:
+    def tickets(self) -> list[Ticket[Reply[Answer]]]:
         """Of all contacts that were admitted."""
         return self.work.tickets if isinstance(self.work, Scan) else [self.work]
 
@@ -56,11 +57,10 @@ class Inference:
         if isinstance(self.work, Scan):
             outcomes, stage_ms = conclude(self.work, door, metrics)
             return to_tensors(self.specs, self.contact_ids, outcomes, self.classes), stage_ms
-        answer = self.work.result()
-        outcome.kind = outcome_of(answer)
+        reply = self.work.result()
+        outcome.kind = outcome_of(reply)
         metrics.count_contacts(door, [outcome.kind])
-        stage_ms = dict(answer.recognition.stage_ms)
-        return to_tensors(self.specs, self.contact_ids, [answer], self.classes), stage_ms
+        return to_tensors(self.specs, self.contact_ids, [reply], self.classes), dict(reply.stage_ms)
 
 
 def submit(
@@ -90,12 +90,12 @@ def submit(
     if seconds is not None:
         deadline = min(deadline, core.deadline_in(seconds))
     ids, contacts = to_contacts(request.inputs, core.limits)
-    work: Ticket[Answer] | Scan
+    work: Ticket[Reply[Answer]] | Scan[Answer]
     if len(contacts) == 1:
         (only,) = contacts
         if not isinstance(only, Contact):
             raise only
-        work = core.submit(model, only, wishes, deadline)
+        work = core.submit(model, Order(only, wishes, encode), deadline)
     else:
-        work = core.submit_scan(model, contacts, wishes, deadline)
+        work = core.submit_scan(model, contacts, wishes, encode, deadline)
     return Inference(specs, ids, work, len(classes_of(model)))

@@ -5,8 +5,9 @@ from typing import Any
 
 from shipshape.bundle import UNKNOWN
 from shipshape.errors import InvalidInput
-from shipshape.serving.core import Core, Model
+from shipshape.serving.core import Core
 from shipshape.serving.encoding import Limits
+from shipshape.serving.model import Model
 from shipshape.serving.oip import convention, results
 from shipshape.serving.oip.parameters import PARAMETERS
 from shipshape.serving.oip.tensors import TensorSpec

@@ -2,16 +2,20 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from shipshape.errors import InvalidInput
-from shipshape.serving.core import Answer
+from shipshape.serving.encoding import Wishes
 from shipshape.serving.faults import Fault
+from shipshape.serving.model import Answer, Reply
 from shipshape.serving.oip.convention import CONTACT_ID
 from shipshape.serving.oip.tensors import NUMPY, Datatype, Tensor, TensorSpec
 from shipshape.types import Recognition
+
+NOT_DESCRIBED = np.empty((0, 5, 16, 32), np.uint8)
 
 
 def _true_heading(found: Recognition) -> float:
@@ -63,12 +67,21 @@ def output_specs(names: Sequence[str]) -> list[TensorSpec]:
     return [OUTPUTS[name] for name in names] or DEFAULT_OUTPUTS
 
 
+def encode(answer: Answer, _: Wishes) -> Answer:
+    """The answer without the images, which no output tells: less has to be handed over by the worker."""
+    bare = replace(answer.recognition, images=None, descriptors=NOT_DESCRIBED)
+    return replace(answer, recognition=bare)
+
+
 def to_tensors(
-    specs: Sequence[TensorSpec], contact_ids: Sequence[str], outcomes: Sequence[Answer | Fault], classes: int
+    specs: Sequence[TensorSpec],
+    contact_ids: Sequence[str],
+    outcomes: Sequence[Reply[Answer] | Fault],
+    classes: int,
 ) -> list[Tensor]:
     """The outputs `specs`; `classes` is how many columns the probabilities have."""
     faults = [outcome if isinstance(outcome, Fault) else None for outcome in outcomes]
-    found = [None if isinstance(outcome, Fault) else outcome.recognition for outcome in outcomes]
+    found = [None if isinstance(outcome, Fault) else outcome.content.recognition for outcome in outcomes]
     beside = {
         CONTACT_ID: contact_ids,
         ERROR: [fault.kind if fault else "" for fault in faults],

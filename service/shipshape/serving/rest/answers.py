@@ -5,15 +5,15 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
 
-import cv2
 import numpy as np
 import orjson
 from jaxtyping import UInt8
 
 from shipshape.budget import Report
-from shipshape.serving.core import Answer, Capacity, Model
+from shipshape.serving.core import Capacity
 from shipshape.serving.encoding import Limits, Wishes, flat_scores
 from shipshape.serving.faults import Fault
+from shipshape.serving.model import Answer, Model, Reply
 from shipshape.serving.timing import Timeouts
 from shipshape.types import Box, ImagePair, RestoredCloud
 
@@ -55,21 +55,27 @@ def from_answer(answer: Answer, wishes: Wishes) -> Json:
         value["restored"] = _restored(found.restored)
     if wishes.images and found.images is not None:
         value["images"] = _images(found.images)
+        value["descriptors"] = [_base64(_png(np.vstack(list(image)))) for image in found.descriptors]
     if answer.png is not None:
         value["rendered_png"] = _base64(answer.png)
     return value
 
 
-def from_outcomes(contact_ids: Sequence[str], outcomes: Sequence[Answer | Fault], wishes: Wishes) -> Json:
-    """A `ScanAnswer`, in the order of the contacts."""
-    results: list[Json] = []
-    for contact_id, outcome in zip(contact_ids, outcomes, strict=True):
-        if isinstance(outcome, Fault):
-            error = {"error": outcome.kind, "detail": outcome.message}
-            results.append({"contact_id": contact_id, "error": error})
-        else:
-            results.append({"contact_id": contact_id, "recognition": from_answer(outcome, wishes)})
-    return {"results": results}
+def encode(answer: Answer, wishes: Wishes) -> bytes:
+    """The JSON text of a `RecognitionAnswer`; on the worker."""
+    return to_bytes(from_answer(answer, wishes))
+
+
+def joined(contact_ids: Sequence[str], outcomes: Sequence[Reply[bytes] | Fault]) -> bytes:
+    """The JSON text of a `ScanAnswer`, in the order of the contacts."""
+    return b'{"results":[%s]}' % b",".join(map(_result, contact_ids, outcomes))
+
+
+def _result(contact_id: str, outcome: Reply[bytes] | Fault) -> bytes:
+    if isinstance(outcome, Fault):
+        error = {"error": outcome.kind, "detail": outcome.message}
+        return to_bytes({"contact_id": contact_id, "error": error})
+    return b'{"contact_id":%s,"recognition":%s}' % (orjson.dumps(contact_id), outcome.content)
 
 
 def from_model(model: Model, limits: Limits, timeouts: Timeouts) -> Json:
@@ -126,7 +132,9 @@ def _images(images: ImagePair) -> Json:
     return {"before": _base64(_png(images.before)), "after": _base64(_png(images.after))}
 
 
-def _png(image: UInt8[np.ndarray, "rows columns 3"]) -> bytes:
+def _png(image: UInt8[np.ndarray, "rows columns *colours"]) -> bytes:
+    import cv2  # noqa: PLC0415  # on the worker alone: the service itself need not hold it
+
     written, encoded = cv2.imencode(".png", image)
     if not written:
         raise RuntimeError(f"cv2 could not encode an image of shape {image.shape}")

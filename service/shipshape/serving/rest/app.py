@@ -6,16 +6,21 @@ from importlib.metadata import version
 from typing import Any
 
 from fastapi import FastAPI
+from starlette.types import ASGIApp
 
+from shipshape import console
 from shipshape.serving.access import Access
 from shipshape.serving.core import Core
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.health import Health
 from shipshape.serving.rest import contract
 from shipshape.serving.rest.bodies import Bodies
+from shipshape.serving.rest.console_routes import add_console
 from shipshape.serving.rest.doorkeeper import Doorkeeper
 from shipshape.serving.rest.farewell import Farewell
+from shipshape.serving.rest.front import Front
 from shipshape.serving.rest.json_process import JsonProcess
+from shipshape.serving.rest.mailbox import Mailbox
 from shipshape.serving.rest.oip_routes import OipRoutes
 from shipshape.serving.rest.probes import add_probes
 from shipshape.serving.rest.problems import add_handlers
@@ -24,6 +29,7 @@ from shipshape.serving.rest.schemas import CapacityAnswer, ModelAnswer, Recognit
 from shipshape.serving.timing import Timeouts
 from shipshape.telemetry import Metrics
 
+RECOGNISE, SCAN = "/v1/recognise", "/v1/scan"
 DESCRIPTION = """Recognises and restores vessels from LiDAR clusters.
 
 Level frame: origin at the LiDAR, gravity-aligned, x ahead of the sensor's own vessel, y to port, z up. Metres;
@@ -31,7 +37,7 @@ radians, except where a name ends in _deg. Packed points are little-endian float
 """
 
 
-def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, health: Health) -> FastAPI:
+def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, health: Health) -> ASGIApp:
     """The application; it answers 503 until the core is open."""
     json = JsonProcess(core.limits)
     # The framework's documentation pages load scripts from elsewhere; the contract itself is at /openapi.json.
@@ -54,23 +60,23 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, 
         app.add_api_route(path, handler, methods=list(methods), operation_id=handler.__name__, **more)
 
     refusals |= contract.unsupported()
-    add("/v1/recognise", routes.recognise, "POST", **_api(RecognitionAnswer, refusals, contract.recognise_extra()))
-    add("/v1/scan", routes.scan, "POST", **_api(ScanAnswer, refusals, contract.scan_extra()))
+    add(RECOGNISE, routes.recognise, "POST", **_api(RecognitionAnswer, refusals, contract.recognise_extra()))
+    add(SCAN, routes.scan, "POST", **_api(ScanAnswer, refusals, contract.scan_extra()))
     add("/v1/model", routes.model, "GET", **_api(ModelAnswer, not_ready | stranger, None))
     capacity_extra = contract.capacity_extra()
     add("/v1/capacity", routes.capacity, "GET", **_api(CapacityAnswer, not_ready | stranger, capacity_extra))
     add_probes(app, health, metrics.registry)
     app.router.routes.extend(OipRoutes(core, metrics, timeouts, access.clients, bodies, health).routes())
+    add_console(app, console.built())
     add_handlers(app)
     contract.add_contract(app)
-    app.add_middleware(Doorkeeper, access=access)
-    app.add_middleware(Farewell, health=health)
-    return app
+    front = Front(app, {RECOGNISE: routes.recognise, SCAN: routes.scan})
+    return Farewell(Doorkeeper(front, access), health)
 
 
 @asynccontextmanager
-async def _until_the_listener_ends(json: JsonProcess) -> AsyncIterator[None]:
-    yield
+async def _until_the_listener_ends(json: JsonProcess) -> AsyncIterator[dict[str, Any]]:
+    yield {"mailbox": Mailbox()}  # in the state of every request
     json.close()
 
 

@@ -4,11 +4,9 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from fastapi import Request
-from starlette.requests import ClientDisconnect
-
 from shipshape.errors import Cancelled, DeadlineExceeded, Overloaded
 from shipshape.serving.encoding import Limits, check_body
+from shipshape.serving.rest.incoming import Incoming
 
 LARGEST_AT_ONCE = 8  # bodies of the largest size that may be held at the same time; thousands of usual ones
 
@@ -25,11 +23,11 @@ class Bodies:
         self._held = 0
 
     @asynccontextmanager
-    async def read(self, request: Request, seconds: float) -> AsyncIterator[bytes]:
+    async def read(self, incoming: Incoming, seconds: float) -> AsyncIterator[bytes]:
         """The whole body, which counts until the block ends.
 
         Args:
-            request: Its body must not have been read yet.
+            incoming: Its body must not have been read yet.
             seconds: What is left until the deadline.
 
         Raises:
@@ -38,29 +36,35 @@ class Bodies:
             DeadlineExceeded: It did not arrive in time.
             Cancelled: The caller left half-way.
         """
-        declared = request.headers.get("content-length", "")
+        declared = incoming.header(b"content-length") or ""
         if declared.isdecimal():
             check_body(int(declared), self._limits)
         chunks: list[bytes] = []
         try:
-            await self._in_time(chunks, request, seconds)
+            await self._in_time(chunks, incoming, seconds)
             yield b"".join(chunks)
         finally:
             self._held -= sum(map(len, chunks))
 
-    async def _in_time(self, chunks: list[bytes], request: Request, seconds: float) -> None:
+    async def _in_time(self, chunks: list[bytes], incoming: Incoming, seconds: float) -> None:
+        if incoming.whole:  # as usual: no timer is needed
+            await self._fill(chunks, incoming)
+            return
         try:
             async with asyncio.timeout(seconds):
-                await self._fill(chunks, request)
+                await self._fill(chunks, incoming)
         except TimeoutError as error:
             raise DeadlineExceeded("expected the whole body before the deadline, got a part of it") from error
-        except ClientDisconnect as error:
-            raise Cancelled("the caller left before its request was complete") from error
 
-    async def _fill(self, chunks: list[bytes], request: Request) -> None:
+    async def _fill(self, chunks: list[bytes], incoming: Incoming) -> None:
         most = LARGEST_AT_ONCE * self._limits.max_body_bytes
         size = 0
-        async for chunk in request.stream():
+        more = True
+        while more:
+            message = await incoming.receive()
+            if message["type"] == "http.disconnect":
+                raise Cancelled("the caller left before its request was complete")
+            chunk, more = message["body"], message["more_body"]
             size += len(chunk)
             check_body(size, self._limits)
             if self._held + len(chunk) > most:

@@ -7,7 +7,7 @@ function of `requests` with its arguments, then the body; each reply is what it 
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
@@ -27,7 +27,7 @@ def main(pipe: "Connection[Any, Any]") -> None:
             pipe.send(_reply(parse, pipe.recv_bytes(), query, limits))
 
 
-def _reply(parse: Callable[..., Any], body: bytes, query: Mapping[str, str], limits: Limits) -> Any:
+def _reply(parse: Callable[..., Any], body: bytes, query: str, limits: Limits) -> Any:
     try:
         return parse(body, query, limits)
     except ShipshapeError as error:

@@ -8,7 +8,7 @@ import asyncio
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import Pipe
 from typing import Any, TypeVar
@@ -17,7 +17,7 @@ from shipshape.errors import DeadlineExceeded, NotReady
 from shipshape.serving.encoding import Limits
 
 T = TypeVar("T")
-Parse = Callable[[bytes, Mapping[str, str], Limits], T]
+Parse = Callable[[bytes, str, Limits], T]
 START_S = 120.0  # longest start: where compiled loops cannot be kept, they are compiled again
 PARSE_S = 30.0  # longest body; the largest takes a second or two
 
@@ -34,7 +34,7 @@ class JsonProcess:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="json")  # that talks to the process
         self._child: _Child | None = None
 
-    async def parse(self, parse: Parse[T], body: bytes, query: Mapping[str, str], seconds: float) -> T:
+    async def parse(self, parse: Parse[T], body: bytes, query: str, seconds: float) -> T:
         """What `parse`, a function of `requests`, makes of `body`.
 
         Raises:
@@ -45,9 +45,7 @@ class JsonProcess:
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(seconds):
-                reply: T | Exception = await loop.run_in_executor(
-                    self._thread, self._ask, parse, body, dict(query)
-                )
+                reply: T | Exception = await loop.run_in_executor(self._thread, self._ask, parse, body, query)
         except TimeoutError as error:
             raise DeadlineExceeded("expected JSON to be read before the deadline, got no time for it") from error
         if isinstance(reply, Exception):
@@ -61,7 +59,7 @@ class JsonProcess:
         self._thread.shutdown(cancel_futures=True)
         self._end()
 
-    def _ask(self, parse: Parse[T], body: bytes, query: Mapping[str, str]) -> Any:
+    def _ask(self, parse: Parse[T], body: bytes, query: str) -> Any:
         if self._child is not None and not self._child.alive:
             self._end()
         try:

@@ -11,14 +11,16 @@ from starlette.routing import Route
 
 from shipshape.errors import NotReady
 from shipshape.serving.clients import Clients
-from shipshape.serving.core import Core, Model
+from shipshape.serving.core import Core
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.serving.health import Health
 from shipshape.serving.load_report import HTTP_HEADER, as_text
+from shipshape.serving.model import Model
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import Inference, submit
 from shipshape.serving.rest.bodies import Bodies
-from shipshape.serving.rest.headers import check_encoding, media_type, timeout_s
+from shipshape.serving.rest.headers import TIMEOUT_HEADER, check_encoding, media_type, timeout_s
+from shipshape.serving.rest.incoming import Incoming
 from shipshape.serving.rest.oip_bodies import JSON_BYTES_HEADER, Asked, parse_infer, write_answer
 from shipshape.serving.rest.problems import ID_HEADER, STATUS, identify, retry_headers
 from shipshape.serving.rest.requests import JSON, PACKED
@@ -76,7 +78,7 @@ class OipRoutes:
     def _route(self, path: str, verb: str, method: str, handle: Handler) -> Route:
         async def guarded(request: Request) -> Response:
             """What every path passes: request id, metrics, and the table of errors."""
-            given = identify(request)
+            given = identify(request.scope)
             with self._metrics.request(DOOR, method) as outcome:
                 try:
                     _check_verb(request, verb)
@@ -108,11 +110,12 @@ class OipRoutes:
         return _json(models.model_metadata(self._model(request), self._core.limits))
 
     async def _infer(self, request: Request, outcome: Outcome) -> Response:
-        model, seconds = self._model(request), timeout_s(request, self._timeouts.default_ms)
+        model, incoming = self._model(request), Incoming(request.scope, request.receive)
+        seconds = timeout_s(request.headers.get(TIMEOUT_HEADER), self._timeouts.default_ms) - incoming.waited()
         _check_form(request)
         deadline = self._core.deadline_in(seconds)
-        with self._clients.share(request.state.client) as share:
-            async with self._bodies.read(request, seconds) as body:
+        with self._clients.share(incoming.client) as share:
+            async with self._bodies.read(incoming, seconds) as body:
 
                 def begin() -> tuple[Asked, Inference]:
                     """Parse and queue; in a thread of its own where the body is large."""
@@ -122,7 +125,7 @@ class OipRoutes:
 
                 small = len(body) <= SMALL_BYTES
                 asked, inference = begin() if small else await run_in_threadpool(begin)
-            await until_settled(inference.tickets, request)
+            await until_settled(inference.tickets, incoming)
         if inference.bulky or len(inference.contact_ids) > SMALL_SCAN:
             return await run_in_threadpool(self._answer, model, asked, inference, outcome)
         return self._answer(model, asked, inference, outcome)
@@ -132,6 +135,7 @@ class OipRoutes:
 
     def _answer(self, model: Model, asked: Asked, inference: Inference, outcome: Outcome) -> Response:
         tensors, stage_ms = inference.conclude(DOOR, self._metrics, outcome)
+        outcome.computed(stage_ms)
         fields = {"model_name": models.NAME, "model_version": models.version_of(model)}
         content, json_bytes = write_answer(fields, tensors, asked)
         headers = {"Server-Timing": server_timing(stage_ms), HTTP_HEADER: as_text(self._core.load())}
@@ -153,9 +157,9 @@ def _check_verb(request: Request, verb: str) -> None:
 
 
 def _check_form(request: Request) -> None:
-    check_encoding(request.headers.get("content-encoding"))
     if "content-type" in request.headers:  # Triton's client names none
-        media_type(request, JSON, PACKED)
+        media_type(request.headers["content-type"], JSON, PACKED)
+    check_encoding(request.headers.get("content-encoding"))
 
 
 def _refused(error: Exception) -> tuple[FaultKind, Response]:

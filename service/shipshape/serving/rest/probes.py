@@ -61,5 +61,5 @@ class _Probes:
     def _answer(self, request: Request, holds: bool, wanted: str) -> Response:
         if holds:
             return Response(f'{{"status":"{wanted}"}}', media_type=JSON)
-        identify(request)
+        identify(request.scope)
         return problem(fault_of(NotReady(f"expected a {wanted} service, got one that is {self._health.state}")))

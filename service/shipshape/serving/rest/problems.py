@@ -7,6 +7,7 @@ import orjson
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.types import Scope
 
 from shipshape.serving.faults import Fault, FaultKind, fault_of
 from shipshape.telemetry import new_request_id, request_id
@@ -24,23 +25,29 @@ STATUS = {
 }
 MEDIA_TYPE = "application/problem+json"
 ID_HEADER = "X-Request-Id"
+ID_NAME = ID_HEADER.lower().encode()  # as it stands among the bytes
+TRACE_NAME = b"traceparent"
 RETRY_HEADER = "Shipshape-Retry-After-Ms"  # beside Retry-After, which knows whole seconds only
 
 
-def identify(request: Request) -> str:
+def identify(scope: Scope) -> str:
     """The request's id, in its problem document and in the log; the same however often it is asked for."""
-    if not hasattr(request.state, "request_id"):
-        request.state.request_id = new_request_id(request.headers.get(ID_HEADER, ""))
-    return str(request.state.request_id)
+    state = scope.setdefault("state", {})
+    if "request_id" not in state:
+        given = {
+            name: value.decode("latin-1") for name, value in scope["headers"] if name in (ID_NAME, TRACE_NAME)
+        }
+        state["request_id"] = new_request_id(given.get(ID_NAME, ""), given.get(TRACE_NAME, ""))
+    return str(state["request_id"])
 
 
 def problem(fault: Fault) -> Response:
     """The problem document of a fault."""
     title = fault.kind.replace("_", " ").capitalize()
     response = document(STATUS[fault.kind], title=title, detail=fault.message, error=fault.kind)
-    response.headers.update(retry_headers(fault))
+    response.raw_headers += [(name.lower().encode(), text.encode()) for name, text in retry_headers(fault).items()]
     if fault.kind is FaultKind.UNAUTHENTICATED:
-        response.headers["WWW-Authenticate"] = "Bearer"
+        response.raw_headers.append((b"www-authenticate", b"Bearer"))
     return response
 
 
@@ -52,6 +59,14 @@ def retry_headers(fault: Fault) -> dict[str, str]:
     return {"Retry-After": str(whole), RETRY_HEADER: str(math.ceil(fault.retry_after_s * 1e3))}
 
 
+def refusal(error: HTTPException, detail: str) -> Response:
+    """The problem document of what has no kind of its own, but a status."""
+    title = HTTPStatus(error.status_code).phrase
+    response = document(error.status_code, title=title, detail=detail, error=FaultKind.INVALID_INPUT)
+    response.headers.update(error.headers or {})
+    return response
+
+
 def add_handlers(app: FastAPI) -> None:
     """Give the framework's own refusals the same form."""
     app.add_exception_handler(HTTPException, _framework_refusal)
@@ -61,29 +76,26 @@ def add_handlers(app: FastAPI) -> None:
 
 def _framework_refusal(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    identify(request)
-    title = HTTPStatus(error.status_code).phrase
+    identify(request.scope)
     detail = error.detail
     if error.status_code == 404:
         detail = f"expected a path that /openapi.json lists, got {request.url.path!r:.80}"
     elif error.status_code == 405:
         allowed = (error.headers or {}).get("Allow", "another method")
         detail = f"expected {allowed} on {request.url.path}, got {request.method}"
-    response = document(error.status_code, title=title, detail=detail, error=FaultKind.INVALID_INPUT)
-    response.headers.update(error.headers or {})
-    return response
+    return refusal(error, detail)
 
 
 def _validation_refusal(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    identify(request)
+    identify(request.scope)
     first = error.errors()[0]
     where = ".".join(map(str, first["loc"]))
     return problem(Fault(FaultKind.INVALID_INPUT, f"expected another value of {where}, got: {first['msg']}"))
 
 
 def _unforeseen(request: Request, error: Exception) -> Response:
-    identify(request)
+    identify(request.scope)
     return problem(fault_of(error))
 
 

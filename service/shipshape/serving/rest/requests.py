@@ -2,12 +2,15 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from functools import lru_cache
+from typing import Any, Generic, TypeVar
+from urllib.parse import parse_qsl
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import from_json
 
 from shipshape.errors import InvalidInput
+from shipshape.executor import Lane
 from shipshape.serving.encoding import (
     Limits,
     Wishes,
@@ -39,6 +42,9 @@ PACKED = "application/octet-stream"
 NPY = "application/x-npy"
 POINTCLOUD2 = "application/vnd.shipshape.pointcloud2"
 M = TypeVar("M", bound=BaseModel)
+Q = TypeVar("Q", bound=OptionsFields)
+T = TypeVar("T")
+REMEMBERED, LONGEST_REMEMBERED = 256, 1024  # queries, and their length: callers send the same ones again and again
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,49 +57,49 @@ class ParsedScan:
     wishes: Wishes
 
 
-def parse_packed(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
+def parse_packed(body: bytes, query: str, limits: Limits) -> tuple[Contact, Wishes]:
     """One contact of packed points, everything else in the query."""
-    fields = _validated(QueryFields, dict(query))
-    return _contact(fields, points_from_bytes(body, limits)), _wishes(fields)
+    fields, wishes = _from_query(QueryFields, query)
+    return _contact(fields, points_from_bytes(body, limits)), wishes
 
 
-def parse_capacity(query: Mapping[str, str]) -> CapacityFields:
+def parse_capacity(query: str) -> CapacityFields:
     """What somebody wants to know the capacity for."""
-    return _validated(CapacityFields, dict(query))
+    return _validated(CapacityFields, _pairs(query))
 
 
-def parse_npy(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
+def parse_npy(body: bytes, query: str, limits: Limits) -> tuple[Contact, Wishes]:
     """One contact in a .npy file, everything else in the query."""
-    fields = _validated(QueryFields, dict(query))
-    return _contact(fields, points_from_npy(body, limits)), _wishes(fields)
+    fields, wishes = _from_query(QueryFields, query)
+    return _contact(fields, points_from_npy(body, limits)), wishes
 
 
-def parse_pointcloud2(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
+def parse_pointcloud2(body: bytes, query: str, limits: Limits) -> tuple[Contact, Wishes]:
     """One contact in the data of a PointCloud2, its layout and everything else in the query."""
-    fields = _validated(PointCloud2Fields, dict(query))
-    return _contact(fields, points_from_pointcloud2(body, _layout(fields), limits)), _wishes(fields)
+    fields, wishes = _from_query(PointCloud2Fields, query)
+    return _contact(fields, points_from_pointcloud2(body, _layout(fields), limits)), wishes
 
 
-def parse_json(body: bytes, query: Mapping[str, str], limits: Limits) -> tuple[Contact, Wishes]:
+def parse_json(body: bytes, query: str, limits: Limits) -> tuple[Contact, Wishes]:
     """One contact in JSON; a query would be overlooked, so there must be none."""
     fields = _validated(RecogniseBody, _json(body, query))
     return _with_points(fields, limits), _wishes(fields)
 
 
-def parse_packed_scan(body: bytes, query: Mapping[str, str], limits: Limits) -> ParsedScan:
+def parse_packed_scan(body: bytes, query: str, limits: Limits) -> ParsedScan:
     """A scan of packed points; how many each contact has, and everything else, in the query."""
-    fields = _validated(ScanQueryFields, dict(query))
+    fields, wishes = _from_query(ScanQueryFields, query)
     counts = parse_counts(fields.counts)
     if len(counts) > limits.max_contacts:
-        return ParsedScan(len(counts), [], [], _wishes(fields))
+        return ParsedScan(len(counts), [], [], wishes)
     contacts = [
         points if isinstance(points, InvalidInput) else _contact(fields, points)
         for points in contacts_from_bytes(body, counts, limits)
     ]
-    return ParsedScan(len(counts), [""] * len(counts), contacts, _wishes(fields))
+    return ParsedScan(len(counts), [""] * len(counts), contacts, wishes)
 
 
-def parse_json_scan(body: bytes, query: Mapping[str, str], limits: Limits) -> ParsedScan:
+def parse_json_scan(body: bytes, query: str, limits: Limits) -> ParsedScan:
     """A scan in JSON; a query would be overlooked, so there must be none."""
     scan = _validated(ScanBody, _json(body, query))
     count = len(scan.contacts)
@@ -108,15 +114,32 @@ def parse_json_scan(body: bytes, query: Mapping[str, str], limits: Limits) -> Pa
     return ParsedScan(count, [_id_of(raw) for raw in scan.contacts], contacts, _wishes(scan))
 
 
-CONTACT_FORMS: Mapping[str, Callable[[bytes, Mapping[str, str], Limits], tuple[Contact, Wishes]]] = {
-    JSON: parse_json,
-    PACKED: parse_packed,
-    NPY: parse_npy,
-    POINTCLOUD2: parse_pointcloud2,
+def announced_contacts(query: str) -> int:
+    """How many contacts the query of a scan of packed points announces."""
+    return len(parse_counts(_from_query(ScanQueryFields, query)[0].counts))
+
+
+@dataclass(frozen=True, slots=True)
+class Form(Generic[T]):
+    """A form of bodies: how one is parsed, and what its query holds; None: nothing, it is all in the body."""
+
+    parse: Callable[[bytes, str, Limits], T]
+    fields: type[OptionsFields] | None
+
+    def lane(self, query: str) -> Lane:
+        """What the request is for, as far as its query tells: the most urgent where only the body does."""
+        return Lane.COLLISION if self.fields is None else _from_query(self.fields, query)[1].lane
+
+
+CONTACT_FORMS: Mapping[str, Form[tuple[Contact, Wishes]]] = {
+    JSON: Form(parse_json, None),
+    PACKED: Form(parse_packed, QueryFields),
+    NPY: Form(parse_npy, QueryFields),
+    POINTCLOUD2: Form(parse_pointcloud2, PointCloud2Fields),
 }
-SCAN_FORMS: Mapping[str, Callable[[bytes, Mapping[str, str], Limits], ParsedScan]] = {
-    JSON: parse_json_scan,
-    PACKED: parse_packed_scan,
+SCAN_FORMS: Mapping[str, Form[ParsedScan]] = {
+    JSON: Form(parse_json_scan, None),
+    PACKED: Form(parse_packed_scan, ScanQueryFields),
 }
 
 
@@ -132,9 +155,26 @@ def sentence(error: ValidationError) -> str:
     return f"expected {where} to be {wanted}, got {first['input']!r:.80}"
 
 
-def _json(body: bytes, query: Mapping[str, str]) -> Any:
-    if query:
-        raise InvalidInput(f"expected no query beside a JSON body, got {next(iter(query))!r:.80}")
+def _from_query(model: type[Q], query: str) -> tuple[Q, Wishes]:
+    """The fields of a query, and the wishes among them."""
+    read: Callable[..., Any] = _read_query if len(query) <= LONGEST_REMEMBERED else _read_query.__wrapped__
+    fields, wishes = read(model, query)
+    return fields, wishes
+
+
+@lru_cache(REMEMBERED)
+def _read_query(model: type[OptionsFields], query: str) -> tuple[OptionsFields, Wishes]:
+    fields = _validated(model, _pairs(query))
+    return fields, _wishes(fields)
+
+
+def _pairs(query: str) -> dict[str, str]:
+    return dict(parse_qsl(query, keep_blank_values=True))
+
+
+def _json(body: bytes, query: str) -> Any:
+    for name in _pairs(query):
+        raise InvalidInput(f"expected no query beside a JSON body, got {name!r:.80}")
     try:
         return from_json(body, allow_inf_nan=True)  # so that NaN is refused as a value, with the right words
     except ValueError as error:

@@ -3,26 +3,35 @@
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import TypeVar
 
-from fastapi import HTTPException, Request, Response
+from fastapi import HTTPException, Response
 from starlette.concurrency import run_in_threadpool
 
 from shipshape.executor import Lane, Ticket
 from shipshape.serving.clients import Clients, Share
-from shipshape.serving.core import Answer, Core, Scan, conclude, outcome_of
+from shipshape.serving.core import Core, Scan, conclude, outcome_of
 from shipshape.serving.encoding import Wishes, check_contacts
 from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.load_report import HTTP_HEADER, as_text
+from shipshape.serving.model import Order, Reply
 from shipshape.serving.rest import answers
 from shipshape.serving.rest.bodies import Bodies
-from shipshape.serving.rest.headers import media_type, timeout_s
+from shipshape.serving.rest.headers import TIMEOUT_NAME, check_encoding, media_type, timeout_s
+from shipshape.serving.rest.incoming import FromRequest, Incoming
 from shipshape.serving.rest.json_process import JsonProcess, Parse
-from shipshape.serving.rest.problems import ID_HEADER, identify, problem
-from shipshape.serving.rest.requests import CONTACT_FORMS, JSON, SCAN_FORMS, parse_capacity
+from shipshape.serving.rest.problems import ID_NAME, identify, problem, refusal
+from shipshape.serving.rest.requests import (
+    CONTACT_FORMS,
+    JSON,
+    PACKED,
+    SCAN_FORMS,
+    announced_contacts,
+    parse_capacity,
+)
 from shipshape.serving.rest.waiting import until_settled
 from shipshape.serving.timing import Timeouts, server_timing
 from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
 
-Handler = Callable[[Request, Outcome, Share], Awaitable[Response]]
+Handler = Callable[[Incoming, Outcome, Share], Awaitable[Response]]
 T = TypeVar("T")
 SMALL_BYTES = 64 * 2**10  # of a body: JSON of this size is parsed in under a millisecond
 LARGE_JSON_BYTES = 256 * 2**10  # some 4,000 points: no thread holds the loop up for more than 3 ms over it
@@ -57,121 +66,119 @@ class Routes:
         self._bodies = bodies
         self._json = json
 
-    async def recognise(self, request: Request) -> Response:
+    async def recognise(self, incoming: FromRequest) -> Response:
         """One contact: JSON, or its points in a binary form with everything else in the query."""
-        return await self._guarded(request, SINGLE, self._recognise)
+        return await self._guarded(incoming, SINGLE, self._recognise)
 
-    async def scan(self, request: Request) -> Response:
+    async def scan(self, incoming: FromRequest) -> Response:
         """Many contacts of one scan, admitted together or not at all; a bad one does not spoil the others."""
-        return await self._guarded(request, SCAN, self._scan)
+        return await self._guarded(incoming, SCAN, self._scan)
 
-    async def model(self, request: Request) -> Response:
+    async def model(self, incoming: FromRequest) -> Response:
         """What this service runs and what it accepts."""
-        return await self._guarded(request, "model_info", self._model)
+        return await self._guarded(incoming, "model_info", self._model)
 
-    async def capacity(self, request: Request) -> Response:
+    async def capacity(self, incoming: FromRequest) -> Response:
         """What the service would promise now, and how its latency budget is doing."""
-        return await self._guarded(request, "capacity", self._capacity)
+        return await self._guarded(incoming, "capacity", self._capacity)
 
-    async def _guarded(self, request: Request, method: str, handle: Handler) -> Response:
+    async def _guarded(self, incoming: Incoming, method: str, handle: Handler) -> Response:
         """What every method passes: request id, metrics, and the table of errors."""
-        given = identify(request)
-        with self._metrics.request("rest", method) as outcome:
+        given = identify(incoming.scope)
+        with self._metrics.request("rest", method, incoming.waited()) as outcome:
             try:
-                with self._clients.share(request.state.client) as share:
-                    response = await handle(request, outcome, share)
-            except HTTPException:  # its answer is the handlers' matter
+                with self._clients.share(incoming.client) as share:
+                    response = await handle(incoming, outcome, share)
+            except HTTPException as error:
                 outcome.kind = FaultKind.INVALID_INPUT
-                raise
+                return refusal(error, error.detail)
             except Exception as error:
                 fault = fault_of(error)
                 outcome.kind = fault.kind
                 return problem(fault)
-        response.headers[ID_HEADER] = given
+        response.raw_headers.append((ID_NAME, given.encode()))
         return response
 
-    async def _recognise(self, request: Request, outcome: Outcome, share: Share) -> Response:
-        model, seconds = self._core.model(), self._timeout(request)
+    async def _recognise(self, incoming: Incoming, outcome: Outcome, share: Share) -> Response:
+        model, seconds = self._core.model(), self._seconds(incoming)
         share.take(1)
-        form = media_type(request, *CONTACT_FORMS)
-        deadline = self._core.deadline_in(seconds)
-        async with self._bodies.read(request, seconds) as body:
-            parse = await self._parser(form, CONTACT_FORMS[form], body, request.query_params, deadline)
+        check_encoding(incoming.header(b"content-encoding"))
+        kind = media_type(incoming.header(b"content-type"), *CONTACT_FORMS)
+        form, deadline = CONTACT_FORMS[kind], self._core.deadline_in(seconds)
+        self._core.sheds(form.lane(incoming.query), deadline)
+        async with self._bodies.read(incoming, seconds) as body:
+            parse = await self._parser(kind, form.parse, body, incoming.query, deadline)
 
-            def submit() -> tuple[Ticket[Answer], Wishes]:
+            def submit() -> tuple[Ticket[Reply[bytes]], Wishes]:
                 """Parse and queue; in a thread of its own where the body is large."""
                 contact, wishes = parse()
-                return self._core.submit(model, contact, wishes, deadline), wishes
+                return self._core.submit(model, Order(contact, wishes, answers.encode), deadline), wishes
 
             ticket, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         outcome.urgent = wishes.lane is not Lane.BATCH
-        await until_settled([ticket], request)
-        answer = ticket.result()
-        outcome.kind = outcome_of(answer)
-        return await _run(lambda: self._single(answer, wishes), small=not _bulky(wishes))
+        await until_settled([ticket], incoming)
+        reply = ticket.result()
+        outcome.kind = outcome_of(reply)
+        outcome.computed(reply.stage_ms)
+        return self._timed(reply.content, reply.stage_ms)
 
-    async def _scan(self, request: Request, outcome: Outcome, share: Share) -> Response:
-        model, seconds = self._core.model(), self._timeout(request)
-        form = media_type(request, *SCAN_FORMS)
-        deadline = self._core.deadline_in(seconds)
-        async with self._bodies.read(request, seconds) as body:
-            parse = await self._parser(form, SCAN_FORMS[form], body, request.query_params, deadline)
+    async def _scan(self, incoming: Incoming, outcome: Outcome, share: Share) -> Response:
+        model, seconds = self._core.model(), self._seconds(incoming)
+        check_encoding(incoming.header(b"content-encoding"))
+        kind = media_type(incoming.header(b"content-type"), *SCAN_FORMS)
+        form, deadline = SCAN_FORMS[kind], self._core.deadline_in(seconds)
+        if kind == PACKED:
+            outcome.contacts = announced_contacts(incoming.query)
+        self._core.sheds(form.lane(incoming.query), deadline)
+        async with self._bodies.read(incoming, seconds) as body:
+            parse = await self._parser(kind, form.parse, body, incoming.query, deadline)
 
-            def submit() -> tuple[Sequence[str], Scan, Wishes]:
+            def submit() -> tuple[Sequence[str], Scan[bytes], Wishes]:
                 """Parse and queue; in a thread of its own where the body is large."""
                 parsed = parse()
                 outcome.contacts = parsed.count
                 check_contacts(parsed.count, self._core.limits)
                 share.take(parsed.count)
-                scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, deadline)
+                scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, answers.encode, deadline)
                 return parsed.contact_ids, scan, parsed.wishes
 
             ids, scan, wishes = await _run(submit, small=len(body) <= SMALL_BYTES)
         outcome.urgent = wishes.lane is not Lane.BATCH
-        await until_settled(scan.tickets, request)
-        small = not _bulky(wishes) and len(ids) <= SMALL_SCAN
-        return await _run(lambda: self._many(ids, scan, wishes), small=small)
+        await until_settled(scan.tickets, incoming)
+        outcomes, stage_ms = conclude(scan, "rest", self._metrics)
+        outcome.computed(stage_ms)
+        return self._timed(answers.joined(ids, outcomes), stage_ms)
 
     async def _parser(
-        self, form: str, parse: Parse[T], body: bytes, query: Mapping[str, str], deadline: float
+        self, kind: str, parse: Parse[T], body: bytes, query: str, deadline: float
     ) -> Callable[[], T]:
         """Gives the parsed body: large JSON is parsed before, in another process, all else when it is called."""
-        if form == JSON and len(body) > LARGE_JSON_BYTES:
+        if kind == JSON and len(body) > LARGE_JSON_BYTES:
             parsed = await self._json.parse(parse, body, query, self._core.seconds_until(deadline))
             return lambda: parsed
         return lambda: parse(body, query, self._core.limits)
 
-    async def _model(self, _request: Request, _: Outcome, _share: Share) -> Response:
+    async def _model(self, _incoming: Incoming, _: Outcome, _share: Share) -> Response:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
         return _json(answers.to_bytes(value))
 
-    async def _capacity(self, request: Request, _: Outcome, _share: Share) -> Response:
-        asked = parse_capacity(request.query_params)
+    async def _capacity(self, incoming: Incoming, _: Outcome, _share: Share) -> Response:
+        asked = parse_capacity(incoming.query)
         capacity = self._core.capacity(asked.points, asked.lane)
         return _json(answers.to_bytes(answers.from_capacity(capacity, self._metrics.budget.report())))
-
-    def _many(self, ids: Sequence[str], scan: Scan, wishes: Wishes) -> Response:
-        outcomes, stage_ms = conclude(scan, "rest", self._metrics)
-        return self._timed(answers.to_bytes(answers.from_outcomes(ids, outcomes, wishes)), stage_ms)
-
-    def _single(self, answer: Answer, wishes: Wishes) -> Response:
-        return self._timed(answers.to_bytes(answers.from_answer(answer, wishes)), answer.recognition.stage_ms)
 
     def _timed(self, content: bytes, stage_ms: Mapping[str, float]) -> Response:
         headers = {"Server-Timing": server_timing(stage_ms), HTTP_HEADER: as_text(self._core.load())}
         return Response(content, headers=headers, media_type=JSON)
 
-    def _timeout(self, request: Request) -> float:
-        return timeout_s(request, self._timeouts.default_ms)
+    def _seconds(self, incoming: Incoming) -> float:
+        """What is left until the deadline, which counts from the request's first byte."""
+        return timeout_s(incoming.header(TIMEOUT_NAME), self._timeouts.default_ms) - incoming.waited()
 
 
 async def _run(work: Callable[[], T], *, small: bool) -> T:
     """Do the work here if it takes less than handing it to a thread, else where it holds nobody up."""
     return work() if small else await run_in_threadpool(work)
-
-
-def _bulky(wishes: Wishes) -> bool:
-    return wishes.restored or wishes.images or wishes.png
 
 
 def _json(content: bytes) -> Response:

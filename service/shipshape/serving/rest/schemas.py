@@ -38,7 +38,10 @@ class OptionsFields(_Asked):
     )
     bundle: str = Field("", description="Name or digest of the bundle insisted on; empty: whichever runs.")
     include_restored: bool = Field(False, description="Put the whole vessel's points into the answer.")
-    include_images: bool = Field(False, description="Put the images before and after inpainting into it.")
+    include_images: bool = Field(
+        False,
+        description="Put the images before and after inpainting, and the SPD2 images of the keypoints, into it.",
+    )
     include_png: bool = Field(False, description="Put a picture for people into it.")
     lane: Lane = Field(
         Lane.TRACKING, strict=False, description="What it is for: who goes first when workers are short."
@@ -195,6 +198,12 @@ class RecognitionAnswer(BaseModel):
     restored: RestoredAnswer | None = Field(None, description="Only with include_restored.")
     images: ImagesAnswer | None = Field(None, description="Only with include_images, on rung full.")
     rendered_png: str | None = Field(None, description="Base64; only with include_png.")
+    descriptors: list[str] | None = Field(
+        None,
+        description="SPD2 images of the keypoints, in their order: grey PNG files in base64, 32 columns of "
+        "azimuth from astern by starboard. Five times 16 rows of elevation from the zenith down: occupied near, "
+        "middle and far; distance of the nearest; depth of what lies there. With include_images, on rung full.",
+    )
 
 
 class ContactError(BaseModel):

@@ -8,13 +8,11 @@ from functools import partial
 from typing import Any
 
 import uvicorn
-from fastapi import FastAPI
+from starlette.types import ASGIApp
 
-from shipshape.serving.rest.doorkeeper import CertifiedProtocol
+from shipshape.serving.rest.protocol import Protocol
 from shipshape.serving.tls import Tls
 
-# httptools takes headers without end; h11 costs about 0.1 ms a request more, 1.1 to 1.2 ms with a fake pipeline.
-PARSER, HEADER_BYTES = CertifiedProtocol, 64 * 2**10
 KEEP_ALIVE_S = 75  # longer than proxies keep idle connections, else they meet a closed one now and then
 
 
@@ -26,13 +24,23 @@ class RestDoor:
         tls: None speaks plain HTTP.
         on_death: Called when the listener ends without having been asked to.
         name: How threads and error messages call it.
+        shared: Other processes may listen on the same port; the system spreads connections among them.
     """
 
-    def __init__(self, app: FastAPI, tls: Tls | None, *, on_death: Callable[[], None], name: str = "REST") -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        tls: Tls | None,
+        *,
+        on_death: Callable[[], None],
+        name: str = "REST",
+        shared: bool = False,
+    ) -> None:
         self._app = app
         self._tls = tls
         self._name = name
         self._on_death = on_death
+        self._shared = shared
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
 
@@ -42,15 +50,14 @@ class RestDoor:
         Raises:
             OSError: The address cannot be bound.
         """
-        listener = _listener(host, port, self._name)
+        listener = _listener(host, port, self._name, shared=self._shared)
         bound: int = listener.getsockname()[1]
         # log_config: the service's own log format holds. access_log: the metrics and debug lines tell more.
         config = uvicorn.Config(
             self._app,
             log_config=None,
             access_log=False,
-            http=PARSER,
-            h11_max_incomplete_event_size=HEADER_BYTES,
+            http=Protocol,
             timeout_keep_alive=KEEP_ALIVE_S,
             ws="none",
             lifespan="on",
@@ -86,10 +93,13 @@ def _context(tls: Tls, *_: Any) -> ssl.SSLContext:  # what uvicorn passes on is 
     return tls.context()
 
 
-def _listener(host: str, port: int, name: str) -> socket.socket:
+def _listener(host: str, port: int, name: str, *, shared: bool) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_STREAM)
+    # Of TCP by name: else asyncio's own loop takes it for something that needs no TCP_NODELAY.
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    if shared:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
     try:
         listener.bind((host, port))
         listener.listen(2048)

@@ -1,0 +1,1 @@
+"""The documentation as a site; `mkdocs.yml` says how it is built."""

@@ -1,0 +1,3 @@
+from oip.real import real
+
+__all__ = ["real"]
