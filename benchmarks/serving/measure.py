@@ -54,7 +54,7 @@ def measure(server: Server, plan: Plan, limit: Limit, log: Path) -> Numbers:
         processes.running(server, plan.server_cores, log) as (process, port),
     ):
         started = time.perf_counter()
-        _until_ready(generator, wire, process, port)
+        until_ready(generator, wire, process, port)
         found = {"ready_s": time.perf_counter() - started}
         _check(generator.submit(client.probe, wire, port, READY_WITHIN_S).result(), wire, limit.vessels())
         generator.submit(client.closed, wire, port, plan.seconds * WARM_SHARE).result()
@@ -87,7 +87,7 @@ def scaling(plan: Plan, log: Path) -> Numbers:
     rates = []
     for used in (cores[:1], cores):
         with pinned(plan.client_cores) as generator, processes.running(server, used, log) as (process, port):
-            _until_ready(generator, wire, process, port)
+            until_ready(generator, wire, process, port)
             generator.submit(client.closed, wire, port, plan.seconds * WARM_SHARE).result()
             load = generator.submit(client.closed, wire, port, plan.seconds).result()
             _all_answered(load)
@@ -95,7 +95,8 @@ def scaling(plan: Plan, log: Path) -> Numbers:
     return {"scaling.1_to_2": rates[1] / rates[0]}
 
 
-def _until_ready(generator: ProcessPoolExecutor, wire: Wire, process: psutil.Popen, port: int) -> None:
+def until_ready(generator: ProcessPoolExecutor, wire: Wire, process: psutil.Popen, port: int) -> None:
+    """Wait for the first answer; raises RuntimeError when the server ends or is too slow."""
     first, started = replace(wire, requests=wire.requests[:1]), time.perf_counter()
     while not generator.submit(client.probe, first, port, 5.0).result():
         if process.poll() is not None:

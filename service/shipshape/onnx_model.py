@@ -95,7 +95,10 @@ class OnnxModel:
         except Exception as error:  # onnxruntime's own exceptions share no base class
             wanted = _listed(self.signature.inputs)
             given = ", ".join(f"{name} {array.dtype}{list(array.shape)}" for name, array in inputs.items())
-            raise BundleError(f"expected {self._label} to take {given}, got a network for {wanted}") from error
+            cause = " ".join(str(error).split())  # here too: an error loses its cause on its way out of a worker
+            raise BundleError(
+                f"expected {self._label} to take {given}, got a network for {wanted}, which says: {cause:.300}"
+            ) from error
         return outputs
 
 

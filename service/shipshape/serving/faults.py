@@ -59,10 +59,16 @@ _KINDS: tuple[tuple[type[Exception], FaultKind], ...] = (
 
 
 def fault_of(error: BaseException) -> Fault:
-    """What the caller is told of `error`; one that was not meant is logged with its traceback and an id."""
+    """What the caller is told of `error`; one that was not meant is logged with its traceback and an id.
+
+    Memory that runs out is meant: less at a time, or later, may well be answered.
+    """
     for known, kind in _KINDS:
         if isinstance(error, known):
             return Fault(kind, str(error), getattr(error, "retry_after_s", None))
+    if isinstance(error, MemoryError):
+        _logger.error("out of memory", exc_info=error)
+        return Fault(FaultKind.OVERLOADED, "expected memory for the answer, got too little: send less at a time")
     incident = uuid.uuid4().hex[:12]
     _logger.error("internal error %s", incident, exc_info=error)
     return Fault(FaultKind.INTERNAL, f"expected an answer, got an internal error; its id in the log is {incident}")

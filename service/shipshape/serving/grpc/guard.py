@@ -1,13 +1,14 @@
 """What every RPC of our services passes: limits, parsing, metrics, request id, and the one table of errors."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import closing
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import grpc
-from google.protobuf.message import DecodeError
+from google.protobuf.message import DecodeError, EncodeError
 
 from shipshape.errors import InvalidInput
 from shipshape.serving.access import Access
@@ -31,7 +32,7 @@ STATUS = {
     FaultKind.INTERNAL: grpc.StatusCode.INTERNAL,
 }
 Behaviour = Callable[[Any, grpc.ServicerContext], Any]
-StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Iterator[Any]]
+StreamBehaviour = Callable[[Iterator[Any], grpc.ServicerContext], Generator[Any, None, None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +84,14 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
         if handler is None or service != self._of.service:
             return handler
         method = self._of.methods[name]
-        # No deserializer: gRPC would answer INTERNAL to bytes that do not parse, and that is not our fault.
+        # Neither deserializer nor serializer: gRPC would answer INTERNAL to bytes that do not parse, which is not
+        # our fault, and to an answer for which memory is short, without a word in the metrics.
         if handler.request_streaming:
             return grpc.stream_stream_rpc_method_handler(
-                self._guarded_stream(handler.stream_stream, handler.request_deserializer),
-                response_serializer=_serialized,
+                self._guarded_stream(handler.stream_stream, handler.request_deserializer)
             )
         return grpc.unary_unary_rpc_method_handler(
-            self._guarded(handler.unary_unary, handler.request_deserializer, method),
-            response_serializer=_serialized,
+            self._guarded(handler.unary_unary, handler.request_deserializer, method)
         )
 
     def _guarded(self, behaviour: Behaviour, parse: Callable[[bytes], Any], method: str) -> Behaviour:
@@ -108,23 +108,23 @@ class Guard(grpc.ServerInterceptor):  # type: ignore[type-arg]  # generic in the
                     with self._access.clients.share(client_of(context, self._access)) as share:
                         current_call.set(Call(outcome, share))
                         share.take(min(outcome.contacts, self._limits.max_contacts))
-                        response = behaviour(message, context)
+                        return _written(behaviour(message, context))
                 except Exception as error:
                     fault = fault_of(error)
                     outcome.kind = fault.kind
                     unknown = isinstance(error, UnknownModel)
                     refuse(context, fault, grpc.StatusCode.NOT_FOUND if unknown else None)
-                return response
 
         return call
 
     def _guarded_stream(self, behaviour: StreamBehaviour, parse: Callable[[bytes], Any]) -> StreamBehaviour:
-        def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Iterator[Any]:
+        def call(raws: Iterator[bytes], context: grpc.ServicerContext) -> Generator[Any, None, None]:
             """One stream; what its messages get wrong is their own answers' matter."""
             identify(context)
             set_trailing(context)
             try:
-                yield from behaviour(self._messages(raws, parse), context)
+                with closing(behaviour(self._messages(raws, parse), context)) as answers:
+                    yield from map(_written, answers)
             except Exception as error:  # a message that is wrong is answered and counted in the stream
                 fault = fault_of(error)
                 with self._metrics.request(self._of.door, STREAM) as outcome:
@@ -161,9 +161,12 @@ def refuse(context: grpc.ServicerContext, fault: Fault, status: grpc.StatusCode 
     raise AssertionError("unreachable: abort raises")
 
 
-def _serialized(response: Any) -> bytes:
+def _written(response: Any) -> bytes:
     """The response, unless a worker has encoded it already."""
-    return response if isinstance(response, bytes) else response.SerializeToString()
+    try:
+        return response if isinstance(response, bytes) else response.SerializeToString()
+    except EncodeError as error:  # all that protobuf says when memory is short, or an answer over its 2 GiB
+        raise MemoryError("no memory to write the answer") from error
 
 
 def _parsed(raw: bytes, parse: Callable[[bytes], Any], service: str) -> Any:

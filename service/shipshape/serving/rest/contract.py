@@ -50,8 +50,9 @@ def scan_extra() -> dict[str, Any]:
 
 
 def capacity_extra() -> dict[str, Any]:
-    """Parameters of /v1/capacity."""
-    return {"parameters": _in_query(CapacityFields)}
+    """Parameters of /v1/capacity, and the refusal of wrong ones."""
+    refusals = problems(FaultKind.INVALID_INPUT)
+    return {"parameters": _in_query(CapacityFields), "responses": {str(code): refusals[code] for code in refusals}}
 
 
 def problems(*kinds: FaultKind) -> dict[int | str, dict[str, Any]]:

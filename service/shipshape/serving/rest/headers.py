@@ -9,6 +9,12 @@ TIMEOUT_HEADER = "Shipshape-Timeout-Ms"
 TIMEOUT_NAME = TIMEOUT_HEADER.lower().encode()  # as a request brings it
 
 
+def check_encoding(header: str | None) -> None:
+    """Refuse a compressed body, with 415: a megabyte of it could be a gigabyte of points."""
+    if header not in (None, "identity"):
+        raise HTTPException(415, f"expected a body without content encoding, got {header:.40}")
+
+
 def media_type(header: str | None, *accepted: str) -> str:
     """The body's media type by its Content-Type, one of `accepted`; anything else is 415."""
     given = (header or "").partition(";")[0].strip().lower()

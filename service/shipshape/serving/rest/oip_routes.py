@@ -19,7 +19,7 @@ from shipshape.serving.model import Model
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import Inference, submit
 from shipshape.serving.rest.bodies import Bodies
-from shipshape.serving.rest.headers import TIMEOUT_HEADER, media_type, timeout_s
+from shipshape.serving.rest.headers import TIMEOUT_HEADER, check_encoding, media_type, timeout_s
 from shipshape.serving.rest.incoming import Incoming
 from shipshape.serving.rest.oip_bodies import JSON_BYTES_HEADER, Asked, parse_infer, write_answer
 from shipshape.serving.rest.problems import ID_HEADER, STATUS, identify, retry_headers
@@ -159,9 +159,7 @@ def _check_verb(request: Request, verb: str) -> None:
 def _check_form(request: Request) -> None:
     if "content-type" in request.headers:  # Triton's client names none
         media_type(request.headers["content-type"], JSON, PACKED)
-    encoding = request.headers.get("content-encoding", "identity")
-    if encoding != "identity":
-        raise HTTPException(415, f"expected a body without content encoding, got {encoding:.40}")
+    check_encoding(request.headers.get("content-encoding"))
 
 
 def _refused(error: Exception) -> tuple[FaultKind, Response]:

@@ -15,7 +15,7 @@ from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.model import Order, Reply
 from shipshape.serving.rest import answers
 from shipshape.serving.rest.bodies import Bodies
-from shipshape.serving.rest.headers import TIMEOUT_NAME, media_type, timeout_s
+from shipshape.serving.rest.headers import TIMEOUT_NAME, check_encoding, media_type, timeout_s
 from shipshape.serving.rest.incoming import FromRequest, Incoming
 from shipshape.serving.rest.json_process import JsonProcess, Parse
 from shipshape.serving.rest.problems import ID_NAME, identify, problem, refusal
@@ -102,6 +102,7 @@ class Routes:
     async def _recognise(self, incoming: Incoming, outcome: Outcome, share: Share) -> Response:
         model, seconds = self._core.model(), self._seconds(incoming)
         share.take(1)
+        check_encoding(incoming.header(b"content-encoding"))
         kind = media_type(incoming.header(b"content-type"), *CONTACT_FORMS)
         form, deadline = CONTACT_FORMS[kind], self._core.deadline_in(seconds)
         self._core.sheds(form.lane(incoming.query), deadline)
@@ -123,6 +124,7 @@ class Routes:
 
     async def _scan(self, incoming: Incoming, outcome: Outcome, share: Share) -> Response:
         model, seconds = self._core.model(), self._seconds(incoming)
+        check_encoding(incoming.header(b"content-encoding"))
         kind = media_type(incoming.header(b"content-type"), *SCAN_FORMS)
         form, deadline = SCAN_FORMS[kind], self._core.deadline_in(seconds)
         if kind == PACKED:
