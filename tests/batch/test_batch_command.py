@@ -166,7 +166,10 @@ def test_folders_are_searched_and_a_folder_of_ros_2_is_one_input(tmp_path, engin
         (["--workers", "0"], "expected --workers of 1 to 1024, got 0"),
         (["--image-method", "full_top"], "expected --image-method with --preset paper alone, got --preset best"),
         (["--sensor-height", "-3"], "expected --sensor-height between 0 and 200 m, got -3.0"),
-        (["--bundle", "nowhere"], "expected a bundle folder at nowhere, got nothing"),
+        (
+            ["--bundle", "nowhere"],
+            "expected a bundle folder at nowhere, got nothing: --bundle or SHIPSHAPE_BUNDLE names another",
+        ),
         (["--service", "nowhere"], "expected --service like grpc://127.0.0.1:50051, got 'nowhere'"),
         (["--compare", "nowhere"], "expected results of a finished run in nowhere, got no contacts.parquet"),
     ],

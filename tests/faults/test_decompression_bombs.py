@@ -112,7 +112,6 @@ def test_json_that_is_many_times_larger_in_memory_stays_out_of_the_service(servi
         assert service.most_mb() - before < 8 * SIZE / 2**20
 
 
-@pytest.mark.xfail(strict=True, reason="the OIP door parses large JSON in the service itself")
 def test_the_same_over_oip(service):
     service.forget_most()
     before = service.most_mb()

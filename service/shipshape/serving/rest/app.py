@@ -49,8 +49,8 @@ def build_app(core: Core, metrics: Metrics, timeouts: Timeouts, access: Access, 
         redoc_url=None,
         lifespan=lambda _: _until_the_listener_ends(json),
     )
-    bodies = Bodies(core.limits)
-    routes = Routes(core, metrics, timeouts, access.clients, bodies, json)
+    bodies = Bodies(core.limits, json)
+    routes = Routes(core, metrics, timeouts, access.clients, bodies)
     refusals = contract.problems(*(kind for kind in FaultKind if kind is not FaultKind.CANCELLED))
     not_ready = contract.problems(FaultKind.NOT_READY)
     stranger = contract.problems(FaultKind.UNAUTHENTICATED)

@@ -14,10 +14,10 @@ from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.model import Order, Reply
 from shipshape.serving.rest import answers
-from shipshape.serving.rest.bodies import Bodies
+from shipshape.serving.rest.bodies import LARGE_JSON_BYTES, Bodies
 from shipshape.serving.rest.headers import TIMEOUT_NAME, check_encoding, media_type, timeout_s
 from shipshape.serving.rest.incoming import FromRequest, Incoming
-from shipshape.serving.rest.json_process import JsonProcess, Parse
+from shipshape.serving.rest.json_process import Parse
 from shipshape.serving.rest.problems import ID_NAME, identify, problem, refusal
 from shipshape.serving.rest.requests import (
     CONTACT_FORMS,
@@ -34,7 +34,6 @@ from shipshape.telemetry import SCAN, SINGLE, Metrics, Outcome
 Handler = Callable[[Incoming, Outcome, Share], Awaitable[Response]]
 T = TypeVar("T")
 SMALL_BYTES = 64 * 2**10  # of a body: JSON of this size is parsed in under a millisecond
-LARGE_JSON_BYTES = 256 * 2**10  # some 4,000 points: no thread holds the loop up for more than 3 ms over it
 SMALL_SCAN = 32  # contacts: written in under a millisecond
 
 
@@ -46,8 +45,7 @@ class Routes:
         metrics: Told of every request.
         timeouts: Deadline of requests that set none.
         clients: Hold each to its share.
-        bodies: Bounds all bodies that are being read.
-        json: Parses large JSON.
+        bodies: Bounds all bodies that are being read, and parses large JSON.
     """
 
     def __init__(
@@ -57,14 +55,12 @@ class Routes:
         timeouts: Timeouts,
         clients: Clients,
         bodies: Bodies,
-        json: JsonProcess,
     ) -> None:
         self._core = core
         self._metrics = metrics
         self._timeouts = timeouts
         self._clients = clients
         self._bodies = bodies
-        self._json = json
 
     async def recognise(self, incoming: FromRequest) -> Response:
         """One contact: JSON, or its points in a binary form with everything else in the query."""
@@ -154,7 +150,7 @@ class Routes:
     ) -> Callable[[], T]:
         """Gives the parsed body: large JSON is parsed before, in another process, all else when it is called."""
         if kind == JSON and len(body) > LARGE_JSON_BYTES:
-            parsed = await self._json.parse(parse, body, query, self._core.seconds_until(deadline))
+            parsed = await self._bodies.json.parse(parse, body, query, self._core.seconds_until(deadline))
             return lambda: parsed
         return lambda: parse(body, query, self._core.limits)
 
