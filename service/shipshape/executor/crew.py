@@ -27,7 +27,11 @@ class Hand(ABC):
 
     @abstractmethod
     def give(self, entry: Entry) -> None:
-        """One more entry."""
+        """One more entry, which may stay here until `flush`."""
+
+    @abstractmethod
+    def flush(self) -> None:
+        """Let the worker have what it was given."""
 
     @abstractmethod
     def take_back(self, entry: Entry) -> None:
@@ -92,6 +96,9 @@ class ThreadHand(Hand):
         self.given[id(entry)] = entry
         self._mail.put(entry)
 
+    def flush(self) -> None:
+        """It has it already."""
+
     def take_back(self, entry: Entry) -> None:
         """Its ticket, which the worker looks at, says so already."""
 
@@ -128,7 +135,7 @@ class ThreadHand(Hand):
 
     def ended(self, entry: Entry) -> None:
         """As `Mailbox.ended`."""
-        self._crew.on_end(self, entry)
+        self._crew.on_end(self, [entry])
 
     def close(self) -> None:
         """Nothing more will be given."""
@@ -154,7 +161,7 @@ class ThreadCrew(Crew):
         clock: Clock,
         *,
         on_stage: Callable[[str, float], None],
-        on_end: Callable[[Hand, Entry], Any],
+        on_end: Callable[[Hand, Sequence[Entry]], Any],
         others_wait: Callable[[], bool],
     ) -> None:
         self.costs = costs

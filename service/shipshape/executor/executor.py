@@ -205,15 +205,17 @@ class Executor:
         for entry in lost:
             entry.ticket.fail(NotReady("expected an answer, got a worker that ended before it: ask again"))
 
-    def ended(self, hand: Hand, entry: Entry) -> None:
-        """A worker has done with an entry, whose ticket is settled."""
-        if entry.began is not None:
-            self._on_wait(entry.task.lane, entry.began - entry.since)
+    def ended(self, hand: Hand, entries: Sequence[Entry]) -> None:
+        """A worker has done with some entries, whose tickets are settled."""
+        for entry in entries:
+            if entry.began is not None:
+                self._on_wait(entry.task.lane, entry.began - entry.since)
         with self._lock:
-            entry.over = True
-            hand.given.pop(id(entry), None)
-            for timed, seconds in entry.timed:
-                self._costs.learn(timed, entry.task.size, seconds)
+            for entry in entries:
+                entry.over = True
+                hand.given.pop(id(entry), None)
+                for timed, seconds in entry.timed:
+                    self._costs.learn(timed, entry.task.size, seconds)
             self._give_out()
             if not hand.given:
                 self._idle.notify_all()
@@ -254,16 +256,20 @@ class Executor:
 
     def _give_out(self) -> None:
         """To workers that have room, the most urgent first; called with the lock held."""
+        given: set[Hand] = set()
         while (first := self._queues.first()) is not None:
             lane, entry = first
             crew = entry.task.crew or self._thread_crew()
             rooms = [(room, len(hand.given), hand) for hand in crew.hands if (room := hand.room(lane)) is not None]
             if not rooms:
-                return
+                break
             *_, hand = min(rooms, key=itemgetter(0, 1))
             self._queues.remove(lane, entry)
             entry.hand = hand
             hand.give(entry)
+            given.add(hand)
+        for hand in given:
+            hand.flush()
 
     def _thread_crew(self) -> ThreadCrew:
         if self._threads is None:

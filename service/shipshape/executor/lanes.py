@@ -34,9 +34,10 @@ class Queues(Generic[T]):
     def __init__(self) -> None:
         self._lanes: dict[Lane, OrderedDict[T, float]] = {lane: OrderedDict() for lane in Lane}
         self._seconds = dict.fromkeys(Lane, 0.0)
+        self._length = 0
 
     def __len__(self) -> int:
-        return sum(map(len, self._lanes.values()))
+        return self._length
 
     def __iter__(self) -> Iterator[T]:
         """In the order in which workers will take them."""
@@ -51,6 +52,7 @@ class Queues(Generic[T]):
         """Behind all others of its lane; `seconds` of work."""
         self._lanes[lane][item] = seconds
         self._seconds[lane] += seconds
+        self._length += 1
 
     def put_back(self, lane: Lane, item: T, seconds: float) -> None:
         """Before all others of its lane: it had been taken once."""
@@ -76,6 +78,7 @@ class Queues(Generic[T]):
         if item not in queue:
             return False
         self._seconds[lane] -= queue.pop(item)
+        self._length -= 1
         if not queue:
             self._seconds[lane] = 0.0  # not what rounding left
         return True

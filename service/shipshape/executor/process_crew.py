@@ -33,8 +33,8 @@ _logger = logging.getLogger(__name__)
 class Owner(Protocol):
     """Who gives out entries and is told what became of them: the executor."""
 
-    def ended(self, hand: Hand, entry: Entry) -> None:
-        """An entry has ended."""
+    def ended(self, hand: Hand, entries: Sequence[Entry]) -> None:
+        """Entries have ended."""
         ...
 
     def gave_up(self, hand: Hand) -> None:
@@ -158,16 +158,17 @@ class ProcessCrew(Crew):
             self._lost(hand)
             return
         hand.heard()
+        reports = [message for message in messages if isinstance(message, Report)]
+        if reports:
+            self._owner.ended(hand, [self._end(hand, report) for report in reports])
         for message in messages:
-            if isinstance(message, Report):
-                self._end(hand, message)
-            else:  # the first
+            if not isinstance(message, Report):  # the first
                 hand.process_id = message
                 self._owner.give_out()
                 if self.whole:
                     self._whole.set()
 
-    def _end(self, hand: ProcessHand, report: Report) -> None:
+    def _end(self, hand: ProcessHand, report: Report) -> Entry:
         entry = hand.given[report.number]
         entry.began, entry.over = report.began, True
         self._owner.stages_ran(report.stage_ms)
@@ -178,7 +179,7 @@ class ProcessCrew(Crew):
                 entry.timed.append((entry.rung, report.seconds))
             entry.ticket.degraded = report.place > 0
             entry.ticket.succeed(report.result)
-        self._owner.ended(hand, entry)
+        return entry
 
     def _lost(self, hand: ProcessHand) -> None:
         lost = len(hand.given)

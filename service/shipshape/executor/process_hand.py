@@ -39,11 +39,16 @@ class ProcessHand(Hand):
             self._heard = time.monotonic()
         self.given[id(entry)] = entry
         task = entry.task
-        self._send(packed((id(entry), task.work, task.deadline, entry.place, entry.why)))
+        message = packed((id(entry), task.work, task.deadline, entry.place, entry.why))
+        with self._sending:
+            self.unsent += message
 
     def take_back(self, entry: Entry) -> None:
         """Nobody wants this entry any more."""
-        self._send(packed((id(entry),)))
+        message = packed((id(entry),))
+        with self._sending:
+            self.unsent += message
+        self.flush()
 
     def room(self, lane: Lane) -> int | None:
         """How many go before; None where it will not be free so soon that one more had better be there by then."""
@@ -77,10 +82,12 @@ class ProcessHand(Hand):
         return max(0.0, expected - self.silent_s(now)) if expected else 0.0
 
     def flush(self) -> None:
-        """Send what can be sent now."""
+        """Send what can be sent now; the crew sends the rest."""
         with self._sending, suppress(OSError):  # no room now; or it died, which the crew hears otherwise
             while self.unsent:
                 del self.unsent[: self.connection.send(self.unsent)]
+        if self.unsent:
+            self._wake()
 
     def close(self) -> None:
         """It may end; one that still computes is ended."""
@@ -89,10 +96,3 @@ class ProcessHand(Hand):
         if self.given and self.process_id is not None:
             with suppress(ProcessLookupError):
                 os.kill(self.process_id, signal.SIGKILL)
-
-    def _send(self, message: bytes) -> None:
-        with self._sending:
-            self.unsent += message
-        self.flush()
-        if self.unsent:
-            self._wake()

@@ -80,7 +80,7 @@ class SocketMailbox:
         prepared: What it works with; its costs are learned.
     """
 
-    LOOK_S = 2e-4  # a look costs as much as the shortest stages
+    LOOK_S = 5e-4  # a look costs as much as the shortest stages
 
     def __init__(self, connection: socket.socket, prepared: Prepared) -> None:
         self._connection = connection

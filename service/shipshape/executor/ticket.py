@@ -74,6 +74,7 @@ class Ticket(Generic[R]):
 
     Attributes:
         degraded: Whether the answer is of another rung than the first; known once it is there.
+        settled: Whether the answer or an error is there; kept apart, since a future takes its lock to tell.
 
     Whoever settles first wins: the worker with the answer, the waiter at the deadline, or the caller that
     leaves. A ticket that settled early is the sign to the worker to drop the work at the next stage boundary.
@@ -82,13 +83,13 @@ class Ticket(Generic[R]):
     def __init__(self, deadline: float, clock: Clock) -> None:
         self.deadline = deadline
         self.degraded = False
+        self.settled = False
         self.future: Future[R] = Future()
+        self.future.add_done_callback(self._note)
         self._clock = clock
 
-    @property
-    def settled(self) -> bool:
-        """Whether the answer or an error is there."""
-        return self.future.done()
+    def _note(self, _: Future[R]) -> None:
+        self.settled = True
 
     def remaining(self) -> float:
         """Seconds left until the deadline, never negative."""

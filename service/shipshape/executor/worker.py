@@ -55,7 +55,7 @@ class Worker:
         mailbox: Mailbox,
         costs: Costs,
         clock: Clock,
-        on_stage: Callable[[str, float], None] = lambda name, seconds: None,
+        on_stage: Callable[[str, float], None] | None = None,
     ) -> None:
         self._mailbox = mailbox
         self._costs = costs
@@ -104,30 +104,31 @@ class Worker:
 
     def _run_stages(self, entry: Entry) -> bool:
         """Until none is left, or the ticket is settled; True when the entry has to give way."""
-        now = self._clock()
-        while self._is_wanted(entry, now) and (stage := entry.stage) is not None:
+        clock, ticket, work = self._clock, entry.ticket, entry.task.work
+        now = clock()
+        while True:
+            slack = ticket.deadline - now
+            if slack <= 0 or entry.left > slack:
+                self._hurry(entry, slack)
+            if ticket.settled or (stage := entry.stage) is None:
+                return False
             if self._queues and self._queues.before(entry.task.lane):
                 return True
             try:
-                stage.run(entry.task.work)
+                stage.run(work)
             finally:
-                started, now = now, self._clock()
+                started, now = now, clock()
                 entry.passed(stage, now - started)
-                self._on_stage(stage.name, now - started)
-            if self._open and now - self._looked >= self._mailbox.LOOK_S:
+                if self._on_stage is not None:
+                    self._on_stage(stage.name, now - started)
+            if now - self._looked >= self._mailbox.LOOK_S and self._open:
                 self._take_in(wait=False)
-                now = self._clock()
-        return False
+                now = clock()
 
-    def _is_wanted(self, entry: Entry, now: float) -> bool:
-        """Whether to go on, on a cheaper rung if time has become short; else its ticket is settled."""
-        ticket = entry.ticket
-        slack = ticket.deadline - now
-        if slack <= 0:
-            ticket.expire()
-        elif entry.left > slack and not entry.step_down(slack, self._costs) and self._others_wait():
-            ticket.expire()  # it would only make them late as well
-        return not ticket.settled
+    def _hurry(self, entry: Entry, slack: float) -> None:
+        """Go on on a cheaper rung, or not at all where that would only make others late as well."""
+        if slack <= 0 or (not entry.step_down(slack, self._costs) and self._others_wait()):
+            entry.ticket.expire()
 
     def _others_wait(self) -> bool:
         return bool(self._queues) or self._mailbox.others_wait()

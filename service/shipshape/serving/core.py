@@ -3,8 +3,10 @@
 contact + wishes + deadline -> checks -> executor -> answer
 """
 
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import wait
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -46,6 +48,10 @@ class Scan(Generic[C]):
         Raises:
             DeadlineExceeded, Cancelled, NotReady: when all that was admitted ended so.
         """
+        # For all at once: to be woken by each of them would take more time than all else here.
+        if self.tickets:
+            patience = min(ticket.remaining() for ticket in self.tickets)
+            wait([ticket.future for ticket in self.tickets], min(patience, threading.TIMEOUT_MAX))
         outcomes = [_outcome(entry) for entry in self._entries]
         admitted = [
             outcome for entry, outcome in zip(self._entries, outcomes, strict=True) if isinstance(entry, Ticket)
