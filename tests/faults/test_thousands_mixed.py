@@ -2,10 +2,14 @@
 
 import itertools
 import json
+import queue
 import random
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 
 import grpc
+import httpx
 import numpy as np
 
 from faults.live import HEIGHT_M, MAX_CONTACTS, PACKED, PATIENCE, POINTS
@@ -101,14 +105,38 @@ BAD_ASKS = {
 CRASH = (rest("/v1/recognise", SENT, PACKED, contact_id="crash"), 500)
 
 
+@contextmanager
+def callers_of(service):
+    """One for each thread, with its own connection: one that threads share may be closed under them."""
+    with ExitStack() as stack:
+        callers = queue.SimpleQueue()
+        for _ in range(CLIENTS):
+            client = httpx.Client(base_url=service.rest.base_url, timeout=PATIENCE, trust_env=False)
+            callers.put(replace(service, rest=stack.enter_context(client)))
+        yield callers
+
+
 def test_ten_thousand_good_and_bad_requests_then_all_good_ones(service):
     draw = random.Random(0)
     everything = {**GOOD_ASKS, **BAD_ASKS, "crash": CRASH}
     names = draw.choices(sorted(everything), k=MIXED)
-    with service.survives(internal=names.count("crash")), ThreadPoolExecutor(CLIENTS) as pool:
-        found = pool.map(lambda name: everything[name][0](service), names)
+    with (
+        service.survives(internal=names.count("crash")),
+        callers_of(service) as callers,
+        ThreadPoolExecutor(CLIENTS) as pool,
+    ):
+
+        def ask(name):
+            """By whoever is free."""
+            caller = callers.get()
+            try:
+                return everything[name][0](caller)
+            finally:
+                callers.put(caller)
+
+        found = pool.map(ask, names)
         wrong = [(name, end) for name, end in zip(names, found, strict=True) if end != everything[name][1]]
         assert wrong == []
         names = list(itertools.islice(itertools.cycle(GOOD_ASKS), GOOD))
-        found = list(pool.map(lambda name: GOOD_ASKS[name][0](service), names))
+        found = list(pool.map(ask, names))
         assert found == [GOOD_ASKS[name][1] for name in names]
