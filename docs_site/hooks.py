@@ -10,8 +10,8 @@ from mkdocs.structure.pages import Page
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT)]  # MkDocs loads this file alone, not the package that it is in
 
-from docs_site import reference  # noqa: E402  as above
-from docs_site.links import rewrite  # noqa: E402  as above
+from docs_site import reference  # noqa: E402  found only now that the root is on the path
+from docs_site.links import rewrite  # noqa: E402  found only now that the root is on the path
 
 # Pages that lie outside docs/, and their places in the site.
 OUTSIDE = {

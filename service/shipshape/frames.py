@@ -41,7 +41,7 @@ def to_level(
     points_vessel: Float32[np.ndarray, "n 3"], heading: float, origin_level: tuple[float, float, float]
 ) -> Float32[np.ndarray, "n 3"]:
     """The inverse of `to_vessel`."""
-    from shipshape import kernels  # noqa: PLC0415  # as above
+    from shipshape import kernels  # noqa: PLC0415  # numba is large, and the service computes in other processes
 
     points_vessel = np.ascontiguousarray(points_vessel, np.float32)
     points_level: Float32[np.ndarray, "n 3"] = kernels.out_of_frame(

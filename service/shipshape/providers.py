@@ -85,7 +85,7 @@ def find_provider(wanted: Literal["auto", "cpu", "cuda"]) -> Provider:
 
 
 def _obstacle_to_cuda() -> str | None:
-    import onnxruntime  # noqa: PLC0415  # as above
+    import onnxruntime  # noqa: PLC0415  # large, and the service computes in other processes
 
     with contextlib.redirect_stdout(io.StringIO()):  # it prints what it does not find
         onnxruntime.preload_dlls()

@@ -39,7 +39,7 @@ class Span:
 
     def __init__(self, tracer: Any, name: str) -> None:
         from opentelemetry import trace  # noqa: PLC0415  only where traces were asked for
-        from opentelemetry.trace.propagation.tracecontext import (  # noqa: PLC0415  as above
+        from opentelemetry.trace.propagation.tracecontext import (  # noqa: PLC0415  an extra, not always installed
             TraceContextTextMapPropagator,
         )
 
@@ -122,10 +122,10 @@ def _provider(url: str, share: float) -> Any:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import (  # noqa: PLC0415  takes half a second
             OTLPSpanExporter,
         )
-        from opentelemetry.sdk.resources import Resource  # noqa: PLC0415  as above
-        from opentelemetry.sdk.trace import TracerProvider  # noqa: PLC0415  as above
-        from opentelemetry.sdk.trace.export import BatchSpanProcessor  # noqa: PLC0415  as above
-        from opentelemetry.sdk.trace.sampling import ParentBasedTraceIdRatio  # noqa: PLC0415  as above
+        from opentelemetry.sdk.resources import Resource  # noqa: PLC0415  an extra, not always installed
+        from opentelemetry.sdk.trace import TracerProvider  # noqa: PLC0415  an extra, not always installed
+        from opentelemetry.sdk.trace.export import BatchSpanProcessor  # noqa: PLC0415  an extra, not always installed
+        from opentelemetry.sdk.trace.sampling import ParentBasedTraceIdRatio  # noqa: PLC0415  an extra, not always installed
     except ModuleNotFoundError as error:
         raise SettingsError(
             f"expected the libraries of the extra shipshape[otel] beside SHIPSHAPE_TRACES_URL, got no {error.name}"

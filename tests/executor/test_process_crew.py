@@ -146,6 +146,14 @@ def test_the_process_that_forks_may_die_as_well(executor, crew):
     assert executor.submit(task(crew)).result()["rung"] == "full"
 
 
+def test_without_anybody_to_fork_it_is_not_worth_keeping_though_its_workers_go_on(executor, tmp_path):
+    crew = started(executor, f"once:{tmp_path / 'prepared'}")
+    assert executor.alive
+    os.kill(crew._server._process.pid, signal.SIGKILL)
+    until(lambda: not executor.alive)
+    assert executor.submit(task(crew)).result()["rung"] == "full"
+
+
 def test_a_caller_that_leaves_ends_the_work_at_the_next_stage(executor, crew, stages, tmp_path):
     ticket = executor.submit(task(crew, first="slow", touch=str(tmp_path / "begun")))
     until((tmp_path / "begun").exists)

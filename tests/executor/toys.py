@@ -62,6 +62,8 @@ def prepare(loaded, what=""):
         raise Unprocessable("expected something to prepare, got nothing")
     if what == "die":
         os._exit(3)
+    if what.startswith("once:"):
+        Path(what.removeprefix("once:")).touch(exist_ok=False)
     loaded()
     if what == "slow":
         time.sleep(3600)

@@ -33,10 +33,10 @@ class Local:
 
     def __init__(self, folder: Path | None) -> None:
         # Seconds of imports, hundreds of megabytes: only for those who asked for it.
-        from shipshape.bundle import load_bundle  # noqa: PLC0415  as above
-        from shipshape.pipeline import Pipeline  # noqa: PLC0415  as above
-        from shipshape.sample import sample_contact  # noqa: PLC0415  as above
-        from shipshape.settings import default_bundle  # noqa: PLC0415  as above
+        from shipshape.bundle import load_bundle  # noqa: PLC0415  large, and only needed where nobody else answers
+        from shipshape.pipeline import Pipeline  # noqa: PLC0415  large, and only needed where nobody else answers
+        from shipshape.sample import sample_contact  # noqa: PLC0415  large, and only needed where nobody else answers
+        from shipshape.settings import default_bundle  # noqa: PLC0415  large, and only needed where nobody else answers
 
         self._pipeline: Pipeline = Pipeline(load_bundle(folder or default_bundle()))
         self.reserve_s = 0.0
@@ -86,7 +86,7 @@ def _check_age(wishes: Wishes) -> None:
 def _answer(contact: Contact, found: Recognition, wishes: Wishes) -> Answer:
     png = None
     if wishes.png:
-        from shipshape.render import render_png  # noqa: PLC0415  as above
+        from shipshape.render import render_png  # noqa: PLC0415  large, and only needed where nobody else answers
 
         png = render_png(contact, found)
     same: dict[str, Any] = {

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
+from shipshape.errors import Cancelled, NotReady
 from shipshape.executor.crew import Crew, Hand
 from shipshape.executor.entry import Entry
 from shipshape.executor.fork_client import ForkServer
@@ -66,6 +67,7 @@ class ProcessCrew(Crew):
         self._owner: Owner
         self._missing_until = 0.0  # when the next worker may be forked in the place of one that is gone
         self._closing = False
+        self._barren = False  # nothing forks any more
         self._whole = threading.Event()  # all workers have been there
         self._fresh: ForkServer | None = None  # in the place of one that died
         self._selector = selectors.DefaultSelector()
@@ -88,13 +90,18 @@ class ProcessCrew(Crew):
         return self._server.message(stopping)
 
     def start(self, owner: Owner, workers: int) -> None:
-        """Have the workers forked, once all is prepared, and wait for them."""
+        """Have the workers forked, once all is prepared, and wait for them.
+
+        Raises:
+            NotReady: They did not come.
+        """
         self._owner, self._workers = owner, workers
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._selector.register(self._server.control, selectors.EVENT_READ)
         self._fill()
         self._thread.start()
-        self._whole.wait(START_S)
+        if not self._whole.wait(START_S):
+            raise NotReady(f"expected {workers} worker processes within {START_S:g} s, got fewer")
 
     @property
     def whole(self) -> bool:
@@ -103,8 +110,8 @@ class ProcessCrew(Crew):
 
     @property
     def worth_keeping(self) -> bool:
-        """Whether no worker is gone for good: they are replaced."""
-        return True
+        """Whether workers that end are replaced, and heard."""
+        return self._thread.is_alive() and not self._barren
 
     def close(self) -> None:
         """End the workers; whoever still waits for one of them is told so."""
@@ -215,12 +222,17 @@ class ProcessCrew(Crew):
         try:
             for _ in ("loaded", "prepared"):
                 fresh.message(lambda: self._closing)
+        except Cancelled:
+            fresh.end()
         except Exception:
             _logger.exception("workers that end will not be replaced")
             fresh.end()
-            return
-        self._fresh = fresh
-        self._wake()
+            self._barren = True
+        else:
+            self._fresh = fresh
+            self._wake()
+            if self._closing:  # nobody may have taken it over
+                fresh.end()
 
     def _wake(self) -> None:
         with suppress(OSError):  # it is awake already, or closed

@@ -12,7 +12,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from shipshape.errors import BundleError, Cancelled, SettingsError
+from shipshape.errors import BundleError, Cancelled, NotReady, SettingsError
 from shipshape.providers import Runtime
 from shipshape.serving.compute import in_processes, runtime_of, workers_of
 from shipshape.serving.model import Model
@@ -50,7 +50,7 @@ def serve(settings: Settings) -> int:
         workers = workers_of(settings, runtime.provider)
         service = Service(settings, workers, load=load, on_death=lambda: ends.put(None))
         addresses = service.start()
-    except (BundleError, SettingsError, OSError) as error:
+    except (BundleError, NotReady, SettingsError, OSError) as error:
         if model is not None:
             model.close()
         return _failed(error, str(error))

@@ -36,6 +36,7 @@ ENCODERS = (
 
 def load_local(folder: Path, max_points: int, runtime: Runtime = PROCESSOR) -> LocalModel:
     """The bundle in `folder` and a pipeline for contacts of at most `max_points`; raises BundleError."""
+    cv2.setNumThreads(1)  # the workers are the parallelism; a pool in each of them only adds latency
     bundle = load_bundle(folder, runtime)
     return LocalModel(bundle, Pipeline(bundle, ContactLimits(max_points=max_points)), render_png)
 
@@ -55,7 +56,6 @@ def prepare(loaded: Callable[[], None], folder: Path, digest: str, max_points: i
         Exception: Whatever a stage raises.
     """
     configure_logging(log_level)
-    cv2.setNumThreads(1)  # the workers are the parallelism; a pool in each of them only adds latency
     model = load_local(folder, max_points)
     if model.bundle.digest != digest:
         raise BundleError(f"expected the bundle {digest}, got {model.bundle.digest}: it was changed meanwhile")

@@ -96,12 +96,12 @@ class RemoteModel:
         """As `Model.start`; the processes have tried the bundle out before they say that they are prepared."""
         try:
             description: Description = self._crew.prepared(stopping)
+            self.pipeline = RemotePipeline(description)
+            executor.learn(self.pipeline.costs, description.size)
+            self._crew.start(executor, executor.workers)
         except BaseException:
             self._crew.close()
             raise
-        self.pipeline = RemotePipeline(description)
-        executor.learn(self.pipeline.costs, description.size)
-        self._crew.start(executor, executor.workers)
         executor.join(self._crew)
         # When it was replaced, and the last request that began with it has its answer, nobody knows it any more.
         weakref.finalize(self, _end, executor, self._crew)
