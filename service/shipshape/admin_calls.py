@@ -5,9 +5,9 @@ import json
 import sys
 import urllib.error
 import urllib.request
-from pathlib import Path
 
 from shipshape.errors import SettingsError
+from shipshape.token_file import read_token
 
 OK, REFUSED = 0, 1
 PATIENCE_S = 120.0  # a swap loads and tries a whole bundle, on a loaded machine
@@ -25,7 +25,7 @@ def admin(arguments: argparse.Namespace) -> int:
     method, path = CALLS[arguments.call]
     body = json.dumps({"folder": str(arguments.folder)}).encode() if arguments.call == "swap" else None
     request = urllib.request.Request(_url(arguments.url) + path, body, method=method)
-    request.add_header("Authorization", f"Bearer {_token(arguments.token_file)}")
+    request.add_header("Authorization", f"Bearer {read_token(arguments.token_file)}")
     request.add_header("Content-Type", "application/json")
     # No proxy: the door is on loopback, and whatever the environment names would learn the token.
     http = urllib.request.build_opener(urllib.request.ProxyHandler({}))
@@ -44,15 +44,6 @@ def _url(given: str) -> str:
     if not given.startswith(("http://", "https://")):
         raise SettingsError(f"expected --url to begin with http:// or https://, got {given!r:.80}")
     return given.rstrip("/")
-
-
-def _token(file: Path) -> str:
-    try:
-        return file.read_text(encoding="ascii").strip()
-    except OSError as error:
-        raise SettingsError(f"expected to read a token from {file}, got: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise SettingsError(f"expected a token in {file}, got bytes that are none") from error
 
 
 def _detail(error: urllib.error.HTTPError) -> str:

@@ -6,7 +6,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from faults.live import PATIENCE, POINTS, live
+from faults.live import PATIENCE, POINTS, eventually, live
 from oip.wire import by_grpc_raw, by_json
 from serving.bundles import copy_bundle, rewritten
 from serving.processes import MODELS
@@ -93,5 +93,5 @@ def test_the_others_of_a_scan_are_answered(service):
 def test_every_id_that_a_caller_was_told_is_in_the_log_with_the_cause(service):
     with service.survives(internal=1):
         incident = service.ask_rest().json()["detail"].removeprefix(OPAQUE)
-        (line,) = [line for line in service.internal_errors() if incident in line]
+        (line,) = eventually(lambda: [line for line in service.internal_errors() if incident in line])
     assert "indices element out of data bounds" in line

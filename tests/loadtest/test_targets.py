@@ -15,7 +15,7 @@ from shipshape.loadtest.mixture import Request
 from shipshape.loadtest.outcomes import Outcome
 from shipshape.loadtest.precise import precise_loop
 from shipshape.loadtest.targets import target_at
-from shipshape.loadtest.targets.address import Keys, parse_address, read_token
+from shipshape.loadtest.targets.address import Keys, parse_address
 from shipshape.loadtest.targets.grpc import GrpcTarget
 from shipshape.loadtest.targets.rest import RestTarget
 from shipshape.loadtest.targets.target import TargetError
@@ -254,11 +254,6 @@ def test_keys_that_cannot_be_read_are_refused(tmp_path):
     for url in ("grpcs://127.0.0.1:1", "https://127.0.0.1:1"):
         with pytest.raises(FileError, match="PEM"):
             run(target_at(address(url, ca=tmp_path / "none.pem")).open())
-    with pytest.raises(FileError, match="token"):
-        read_token(tmp_path / "none")
-    (tmp_path / "token").write_text("abc\n")
-    assert read_token(tmp_path / "token") == "abc"
-    assert read_token(None) == ""
 
 
 def test_a_stream_that_breaks_is_opened_again():

@@ -11,6 +11,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from oip.wire import FORMS, HEADER, INFER, binary, by_grpc_raw, by_json, call, envelope, message, read, scan
 from serving.fakes import PATIENCE, cluster, running, until
 from shipshape.inference.open_inference_pb2_grpc import GRPCInferenceServiceStub
+from shipshape.serving.rest.bodies import LARGE_JSON_BYTES
 
 POINTS = cluster()
 HOLD = {"points": POINTS, "contact_id": [b"hold"]}
@@ -121,3 +122,19 @@ def test_a_large_request_and_a_large_answer():
         by_rest, by_grpc = by_json(doors, {"points": many}, names), by_grpc_raw(doors, {"points": many}, names)
         assert by_rest.outputs["restored_counts"].tolist() == [40_000]
         assert np.array_equal(by_rest.outputs["restored_points"], by_grpc.outputs["restored_points"])
+
+
+def test_large_json_before_raw_tensors_is_parsed_in_another_process(monkeypatch):
+    asked = []
+
+    async def parse(self, parse, body, query, seconds):
+        asked.append(len(body))
+        return parse(body, query, self._limits)
+
+    monkeypatch.setattr("shipshape.serving.rest.json_process.JsonProcess.parse", parse)
+    text = b'{"inputs": [{"name": "points", "datatype": "FP32", "shape": [120, 3],'
+    text += b'"parameters": {"binary_data_size": 1440}}]}' + b" " * LARGE_JSON_BYTES
+    body = text + cluster(120).tobytes()
+    with running() as doors:
+        answer = doors.rest.post(INFER, content=body, headers={HEADER: str(len(text))})
+        assert (answer.status_code, asked) == (200, [len(body)]), answer.text

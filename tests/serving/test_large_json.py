@@ -13,7 +13,7 @@ import pytest
 from contract.test_forms import said
 from serving.fakes import cluster, rows, running, until
 from shipshape.serving.rest import json_process, requests
-from shipshape.serving.rest.routes import LARGE_JSON_BYTES
+from shipshape.serving.rest.bodies import LARGE_JSON_BYTES
 
 POINTS = cluster(20_000)
 JSON = {"content-type": "application/json"}
@@ -103,7 +103,7 @@ def test_it_is_parsed_elsewhere(large, monkeypatch):
 )
 def test_it_gets_the_error_of_a_small_one(large, monkeypatch, body, path):
     elsewhere = said(post(large, body, path))
-    monkeypatch.setattr("shipshape.serving.rest.routes.LARGE_JSON_BYTES", 2**40)
+    monkeypatch.setattr("shipshape.serving.rest.bodies.LARGE_JSON_BYTES", 2**40)
     assert said(post(large, body, path)) == elsewhere
     assert elsewhere[0] in (400, 413)
 

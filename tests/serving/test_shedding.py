@@ -8,7 +8,6 @@ import pytest
 from serving.fakes import HEAD, PATIENCE, cluster, running, until
 from shipshape.errors import DeadlineExceeded, Overloaded
 from shipshape.executor import Executor, Lane, Task
-from shipshape.serving.shedding import check_room
 
 POINTS = cluster()
 PACKED = {"content-type": "application/octet-stream"}
@@ -58,23 +57,23 @@ def held():
 
 def test_an_empty_queue_lets_everybody_pass(held):
     for lane in Lane:
-        check_room(held.executor, lane, held.now + 1e-6)
+        held.executor.check(lane, held.now + 1e-6)
 
 
 def test_who_is_late_is_told_so_before_anything_else(held):
     held.fill(Lane.COLLISION, 8)
     with pytest.raises(DeadlineExceeded):
-        check_room(held.executor, Lane.COLLISION, held.now)
+        held.executor.check(Lane.COLLISION, held.now)
 
 
 def test_each_lane_is_refused_when_its_share_of_the_queue_is_full(held):
     for depth in range(9):
         for lane, places in ((Lane.COLLISION, 8), (Lane.TRACKING, 7), (Lane.BATCH, 4)):
             if depth < places:
-                check_room(held.executor, lane, held.now + 1e5)
+                held.executor.check(lane, held.now + 1e5)
                 continue
             with pytest.raises(Overloaded, match=r"^expected at most 0 more in the queue of 8, got 1$") as caught:
-                check_room(held.executor, lane, held.now + 1e5)
+                held.executor.check(lane, held.now + 1e5)
             assert caught.value.retry_after_s >= 0
         if depth < 8:
             held.fill(Lane.COLLISION, 1)
@@ -83,9 +82,9 @@ def test_each_lane_is_refused_when_its_share_of_the_queue_is_full(held):
 def test_who_has_no_time_behind_what_waits_is_told_how_long_that_is(held, monkeypatch):
     held.fill(Lane.TRACKING, 1)
     monkeypatch.setattr(held.executor, "wait", lambda lane: 3.0)
-    check_room(held.executor, Lane.TRACKING, held.now + 5.0)
+    held.executor.check(Lane.TRACKING, held.now + 5.0)
     with pytest.raises(Overloaded) as caught:
-        check_room(held.executor, Lane.TRACKING, held.now + 1.0)
+        held.executor.check(Lane.TRACKING, held.now + 1.0)
     assert str(caught.value) == "expected 4500 ms for an answer behind all that waits, got 1000 ms"
     assert caught.value.retry_after_s == pytest.approx(3.5)
 

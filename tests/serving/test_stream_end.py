@@ -108,6 +108,7 @@ def test_streams_are_bounded_and_leave_the_others_their_threads():
 def test_a_stop_answers_what_was_read_then_is_unavailable():
     with running(drain_s=10 * PATIENCE) as doors, ThreadPoolExecutor(1) as pool:
         silent, busy = Call(doors), Call(doors, message(1, "hold"), message(2, "queued"))
+        assert doors.pipeline.entered.acquire(timeout=PATIENCE)
         until(lambda: doors.service.executor.queue_depth == 1)
         stopping = pool.submit(doors.service.stop)
         assert silent.rest() == ([], UNAVAILABLE)

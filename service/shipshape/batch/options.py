@@ -8,10 +8,11 @@ from pathlib import Path
 from shipshape.batch.engines import Engine, LocalEngine, ServiceEngine
 from shipshape.batch.method import Method, Segmentation
 from shipshape.batch.service import Service
-from shipshape.errors import FileError, SettingsError
+from shipshape.errors import SettingsError
 from shipshape.executor import usable_cores
 from shipshape.pointfiles.clusters import ID_NAMES
 from shipshape.settings import load_settings
+from shipshape.token_file import read_token
 from shipshape.types import ImageMethod, Preset
 
 
@@ -48,7 +49,8 @@ def engine_of(arguments: argparse.Namespace, method: Method) -> Engine:
     if arguments.service and arguments.ray:
         raise SettingsError("expected --service or --ray, got both")
     if arguments.service:
-        return ServiceEngine(Service(arguments.service, arguments.ca, _token(arguments.token_file)))
+        token = "" if arguments.token_file is None else read_token(arguments.token_file)
+        return ServiceEngine(Service(arguments.service, arguments.ca, token))
     folder = arguments.bundle or load_settings().bundle
     if arguments.ray:
         return _ray_engine(arguments.ray, folder)
@@ -80,12 +82,3 @@ def _segmentation(arguments: argparse.Namespace) -> Segmentation | None:
         if not (math.isfinite(value) and value >= least):
             raise SettingsError(f"expected --{name.replace('_', '-')} of {least:g} or more, got {value}")
     return Segmentation(**given)
-
-
-def _token(path: Path | None) -> str:
-    if path is None:
-        return ""
-    try:
-        return path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"expected to read a token from {path.name}, got: {error}") from error

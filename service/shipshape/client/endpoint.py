@@ -8,6 +8,7 @@ import grpc
 
 from shipshape.client.links import LAN, Link
 from shipshape.errors import FileError, SettingsError
+from shipshape.token_file import read_token
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ class Endpoint:
         address, options = urlsplit(self.url).netloc, self.link.channel_options()
         if not self.secure:
             return grpc.aio.insecure_channel(address, options, self.link.compression)
-        pem = [None if path is None else _read(path, "PEM") for path in (self.ca, self.key, self.certificate)]
+        pem = [None if path is None else _read(path) for path in (self.ca, self.key, self.certificate)]
         return grpc.aio.secure_channel(address, grpc.ssl_channel_credentials(*pem), options, self.link.compression)
 
     def metadata(self) -> tuple[tuple[str, str], ...]:
@@ -68,11 +69,7 @@ class Endpoint:
         """
         if self.token_file is None:
             return ()
-        try:
-            token = _read(self.token_file, "a token").decode("ascii").strip()
-        except UnicodeDecodeError as error:
-            raise FileError(f"expected a token in {self.token_file.name}, got bytes that are none") from error
-        return (("authorization", f"Bearer {token}"),)
+        return (("authorization", f"Bearer {read_token(self.token_file)}"),)
 
 
 def as_endpoint(given: "Endpoint | str") -> Endpoint:
@@ -80,8 +77,8 @@ def as_endpoint(given: "Endpoint | str") -> Endpoint:
     return given if isinstance(given, Endpoint) else Endpoint(given)
 
 
-def _read(path: Path, what: str) -> bytes:
+def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise FileError(f"expected {what} in {path.name}, got: {error.strerror}") from error
+        raise FileError(f"expected PEM in {path.name}, got: {error.strerror}") from error

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from shipshape.errors import DeadlineExceeded, Overloaded
 from shipshape.executor.costs import Costs
 from shipshape.executor.entry import Entry, why_cheaper
+from shipshape.executor.lanes import Lane, places
 
 HEADROOM = 1.25  # over the predicted time: costs are means, and half of all work takes longer
 QUEUE_HEADROOM = 1.5  # over that of a queue: when much is asked, the doors take more of the cores
@@ -37,6 +38,37 @@ def settle_rungs(entries: Sequence[Entry], costs: Costs, *, wait: float, slack: 
         entry.move_to(place, costs, why_cheaper(full, slack))
 
 
+def check_room(wanted: int, lane: Lane, *, limit: int, depth: int, wait: float) -> None:
+    """Refuse so many tasks of a lane if they have no place in the queue.
+
+    Args:
+        wanted: How many.
+        lane: Of all of them.
+        limit: How long the queue may get.
+        depth: How long it is.
+        wait: Seconds until a worker will be free for the first of them.
+
+    Raises:
+        Overloaded: Says when to come back.
+    """
+    room = max(0, places(lane, limit) - depth)
+    if wanted > room:
+        raise Overloaded(
+            f"expected at most {room} more in the queue of {limit}, got {wanted}",
+            retry_after_s=wait * min(1.0, (wanted - room) / max(1, depth)),
+        )
+
+
+def check_wait(wait: float, slack: float) -> None:
+    """Refuse whatever it is, however cheap, that has no time behind what stands before it; seconds.
+
+    Raises:
+        Overloaded: Says when to come back.
+    """
+    if (needed := with_headroom(wait, 0.0)) > slack:
+        raise _late(needed, slack)
+
+
 def with_headroom(wait: float, alone: float) -> float:
     """Seconds that can be promised to work that waits `wait` and takes `alone`, both as predicted."""
     return QUEUE_HEADROOM * wait + HEADROOM * alone
@@ -52,8 +84,11 @@ def _refuse(wait: float, alone: float, slack: float) -> None:
         raise DeadlineExceeded(
             f"expected at least {HEADROOM * alone * 1e3:.1f} ms for an answer, got {slack * 1e3:.1f} ms"
         )
-    needed = with_headroom(wait, alone)
-    raise Overloaded(
+    raise _late(with_headroom(wait, alone), slack)
+
+
+def _late(needed: float, slack: float) -> Overloaded:
+    return Overloaded(
         f"expected {needed * 1e3:.0f} ms for an answer behind all that waits, got {slack * 1e3:.0f} ms",
         retry_after_s=needed - slack,
     )

@@ -50,6 +50,13 @@ class Hand(ABC):
     def alive(self) -> bool:
         """Whether it works at all."""
 
+    @property
+    def waiting(self) -> int:
+        """How many of its entries wait for the one that is computed."""
+        if len(self.given) <= 1:
+            return 0
+        return max(0, sum(not entry.ticket.settled for entry in self.given.values()) - 1)
+
     def seconds(self, lane: Lane, now: float) -> float:
         """That its work will probably take which goes before new work of this lane."""
         return sum(entry.left for entry in self.given.values() if entry.task.lane in UP_TO[lane])

@@ -14,14 +14,14 @@ from functools import partial
 from operator import itemgetter
 from typing import Any
 
-from shipshape.errors import NotReady, Overloaded
-from shipshape.executor.admission import settle_rungs, with_headroom
+from shipshape.errors import DeadlineExceeded, NotReady
+from shipshape.executor.admission import check_room, check_wait, settle_rungs, with_headroom
 from shipshape.executor.costs import Costs
 from shipshape.executor.counts import Counts
 from shipshape.executor.crew import Crew, Hand, ThreadCrew
 from shipshape.executor.deadlines import Deadlines
 from shipshape.executor.entry import Entry
-from shipshape.executor.lanes import Lane, Queues, places
+from shipshape.executor.lanes import Lane, Queues
 from shipshape.executor.ticket import Clock, R, Rung, Task, Ticket, W
 from shipshape.executor.worker import rehearse
 
@@ -90,11 +90,29 @@ class Executor:
             for entry in entries:
                 self._queues.append(entry.task.lane, entry, entry.left)
                 entry.since = now
-            self._give_out()
+            self.give_out()
         for entry in entries:
             entry.ticket.future.add_done_callback(partial(self._settled, entry))
             self._deadlines.watch(entry.ticket)
         return [entry.ticket for entry in entries]
+
+    def check(self, lane: Lane, deadline: float) -> None:
+        """Say no at once, before anything of a task is known, where even the cheapest one would be refused.
+
+        Args:
+            lane: Of the task; the most urgent one where it is not known.
+            deadline: On the executor's clock, seconds.
+
+        Raises:
+            DeadlineExceeded: It is already late.
+            Overloaded: No place in the queue, or no time behind all that waits.
+        """
+        slack = deadline - self.clock()
+        if slack <= 0:
+            raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
+        with self._lock:
+            if self._queues:
+                check_wait(self._check_room(1, lane), slack)
 
     def rehearse(self, task: Task[W, R]) -> R:
         """Run a task here and now, only to learn what it costs: it is neither counted nor observed."""
@@ -126,12 +144,14 @@ class Executor:
     def promise(self, rung: Rung[Any], size: float, lane: Lane) -> float:
         """Seconds in which new work of this size and lane would be answered on this rung, as admission sees it."""
         with self._lock:
-            return with_headroom(self._wait(lane), sum(self._costs.each([*rung.stages, rung], size)))
+            return with_headroom(self.wait(lane), sum(self._costs.each([*rung.stages, rung], size)))
 
     def wait(self, lane: Lane) -> float:
         """Seconds until a worker will probably be free for new work of this lane."""
         with self._lock:
-            return self._wait(lane)
+            now = self.clock()
+            given = sum(hand.seconds(lane, now) for hand in self._hands())
+            return (self._queues.seconds(lane) + given) / self.workers
 
     @property
     def alive(self) -> bool:
@@ -142,12 +162,7 @@ class Executor:
     def queue_depth(self) -> int:
         """Tasks that wait for a worker."""
         with self._lock:
-            return len(self._queues) + sum(map(_waiting, self._hands()))
-
-    @property
-    def queued(self) -> int:
-        """Tasks that no worker has been given yet."""
-        return len(self._queues)
+            return len(self._queues) + sum(hand.waiting for hand in self._hands())
 
     @property
     def load(self) -> float:
@@ -171,8 +186,7 @@ class Executor:
     def sound(self) -> bool:
         """Whether every worker lives and none is stuck in a stage."""
         with self._lock:
-            now = self.clock()
-            stuck = any(hand.is_stuck(now) for hand in self._hands())
+            stuck = any(hand.is_stuck(self.clock()) for hand in self._hands())
             return self._open and not stuck and all(crew.whole for crew in self._crews)
 
     def stop(self, drain_s: float) -> bool:
@@ -200,7 +214,7 @@ class Executor:
             hand.given.clear()
             for entry in lost:
                 entry.over = True
-            self._give_out()
+            self.give_out()
             self._idle.notify_all()
         for entry in lost:
             entry.ticket.fail(NotReady("expected an answer, got a worker that ended before it: ask again"))
@@ -216,7 +230,7 @@ class Executor:
                 hand.given.pop(id(entry), None)
                 for timed, seconds in entry.timed:
                     self._costs.learn(timed, entry.task.size, seconds)
-            self._give_out()
+            self.give_out()
             if not hand.given:
                 self._idle.notify_all()
 
@@ -226,50 +240,43 @@ class Executor:
             self._on_stage(name, milliseconds / 1e3)
 
     def give_out(self) -> None:
-        """A worker has come."""
+        """Give tasks to workers that have room, the most urgent first."""
+        given: set[Hand] = set()
         with self._lock:
-            self._give_out()
+            while (first := self._queues.first()) is not None:
+                lane, entry = first
+                crew = entry.task.crew or self._thread_crew()
+                rooms = [
+                    (room, len(hand.given), hand) for hand in crew.hands if (room := hand.room(lane)) is not None
+                ]
+                if not rooms:
+                    break
+                *_, hand = min(rooms, key=itemgetter(0, 1))
+                self._queues.remove(lane, entry)
+                entry.hand = hand
+                hand.give(entry)
+                given.add(hand)
+            for hand in given:
+                hand.flush()
 
     def _admit(self, entries: Sequence[Entry]) -> None:
         """The one place that says yes or no; called with the lock held."""
         if not self._open:
             raise NotReady("expected a running service, got one that is stopping")
-        lane, wanted = entries[0].task.lane, len(entries)
-        room = max(0, places(lane, self.queue_limit) - self.queue_depth)
-        wait = self._wait(lane)
-        if wanted > room:
-            raise Overloaded(
-                f"expected at most {room} more in the queue of {self.queue_limit}, got {wanted}",
-                retry_after_s=wait * min(1.0, (wanted - room) / max(1, len(self._queues))),
-            )
+        lane = entries[0].task.lane
+        wait = self._check_room(len(entries), lane)
         slack = min(entry.task.deadline for entry in entries) - self.clock()
         settle_rungs(entries, self._costs, wait=wait, slack=slack, workers=self.workers)
 
-    def _wait(self, lane: Lane) -> float:
-        now = self.clock()
-        given = sum(hand.seconds(lane, now) for hand in self._hands())
-        return (self._queues.seconds(lane) + given) / self.workers
+    def _check_room(self, wanted: int, lane: Lane) -> float:
+        """Refuse what has no place; else the seconds that it will wait."""
+        wait = self.wait(lane)
+        check_room(wanted, lane, limit=self.queue_limit, depth=self.queue_depth, wait=wait)
+        return wait
 
     def _hands(self) -> Iterable[Hand]:
         for crew in self._crews:
             yield from crew.hands
-
-    def _give_out(self) -> None:
-        """To workers that have room, the most urgent first; called with the lock held."""
-        given: set[Hand] = set()
-        while (first := self._queues.first()) is not None:
-            lane, entry = first
-            crew = entry.task.crew or self._thread_crew()
-            rooms = [(room, len(hand.given), hand) for hand in crew.hands if (room := hand.room(lane)) is not None]
-            if not rooms:
-                break
-            *_, hand = min(rooms, key=itemgetter(0, 1))
-            self._queues.remove(lane, entry)
-            entry.hand = hand
-            hand.give(entry)
-            given.add(hand)
-        for hand in given:
-            hand.flush()
 
     def _thread_crew(self) -> ThreadCrew:
         if self._threads is None:
@@ -291,10 +298,3 @@ class Executor:
                 self._idle.notify_all()
             elif not entry.over and isinstance(entry.hand, Hand):
                 entry.hand.take_back(entry)
-
-
-def _waiting(hand: Hand) -> int:
-    """How many entries of a worker wait for it."""
-    if len(hand.given) <= 1:
-        return 0
-    return max(0, sum(not entry.ticket.settled for entry in hand.given.values()) - 1)

@@ -16,9 +16,10 @@ from shipshape.loadtest.mixture import Mixture, cut
 from shipshape.loadtest.plan import Plan, Terms, make_plan
 from shipshape.loadtest.quantities import seconds_of, weights_of
 from shipshape.loadtest.recording import read_recording
-from shipshape.loadtest.targets.address import Address, Keys, parse_address, read_token
+from shipshape.loadtest.targets.address import Address, Keys, parse_address
 from shipshape.pointfiles import read_clusters
 from shipshape.sample import sample_contact
+from shipshape.token_file import read_token
 
 DEFAULT_RATE = 100.0  # contacts a second, where neither --rate nor a recording says one
 
@@ -75,7 +76,8 @@ def options_of(arguments: argparse.Namespace) -> LoadTest:
         FileError: A file that cannot be read.
     """
     budget = parse_budget(arguments.budget)
-    keys = Keys(arguments.ca, arguments.cert, arguments.key, read_token(arguments.token_file))
+    token = "" if arguments.token_file is None else read_token(arguments.token_file)
+    keys = Keys(arguments.ca, arguments.cert, arguments.key, token)
     deadline_s = budget.limit_s if arguments.deadline is None else seconds_of(arguments.deadline)
     if arguments.rate is not None and not 0 < arguments.rate < math.inf:
         raise SettingsError(f"expected --rate above 0, got {arguments.rate}")

@@ -16,7 +16,6 @@ from shipshape.serving.age import age_of, time_left
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
 from shipshape.serving.model import Encode, Model, Order, Reply
-from shipshape.serving.shedding import check_room
 from shipshape.serving.timing import summed
 from shipshape.telemetry import DEGRADED, OK, Metrics
 from shipshape.types import Contact, Options, Rung
@@ -155,9 +154,9 @@ class Core:
         """Contacts that wait or are computed, a worker: over 1, there is a queue."""
         return self._executor.load
 
-    def sheds(self, lane: Lane, deadline: float) -> None:
-        """Raises at once what admission would say to even the cheapest contact of this lane; see `shedding`."""
-        check_room(self._executor, lane, deadline)
+    def check(self, lane: Lane, deadline: float) -> None:
+        """Raises at once, before anything of a request is read, what even its cheapest contact would be told."""
+        self._executor.check(lane, deadline)
 
     def submit(self, model: Model, order: Order[C], deadline: float) -> Ticket[Reply[C]]:
         """Queue one contact; a ticket for its answer.

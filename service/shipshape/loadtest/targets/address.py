@@ -63,13 +63,3 @@ def parse_address(url: str, keys: Keys, connections: int) -> Address:
     if not complete:
         raise SettingsError(f"expected a target like grpc://127.0.0.1:50051, got {url!r:.80}")
     return Address(parts.scheme, parts.netloc, parts.path.strip("/"), keys, connections)
-
-
-def read_token(path: Path | None) -> str:
-    """The bearer token in a file, or none; raises FileError when it cannot be read."""
-    if path is None:
-        return ""
-    try:
-        return path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"expected to read a token from {path.name}, got: {error}") from error

@@ -1,14 +1,16 @@
 """A request's body, read within its deadline and within what all bodies together may hold."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from typing import TypeVar
 
 from shipshape.errors import Cancelled, DeadlineExceeded, Overloaded
 from shipshape.serving.encoding import Limits, check_body
 from shipshape.serving.rest.incoming import Incoming
-from shipshape.serving.rest.json_process import JsonProcess
+from shipshape.serving.rest.json_process import JsonProcess, Parse
 
+T = TypeVar("T")
 LARGE_JSON_BYTES = 256 * 2**10  # some 4,000 points: no thread holds the loop up for more than 3 ms over it
 LARGEST_AT_ONCE = 8  # bodies of the largest size that may be held at the same time; thousands of usual ones
 
@@ -22,7 +24,7 @@ class Bodies:
     """
 
     def __init__(self, limits: Limits, json: JsonProcess) -> None:
-        self.json = json
+        self._json = json
         self._limits = limits
         self._held = 0
 
@@ -49,6 +51,26 @@ class Bodies:
             yield b"".join(chunks)
         finally:
             self._held -= sum(map(len, chunks))
+
+    async def parser(
+        self, parse: Parse[T], body: bytes, query: str, seconds: float, *, json_bytes: int
+    ) -> Callable[[], T]:
+        """Gives what `parse` makes of a body: of large JSON before, in another process, else when it is called.
+
+        Args:
+            parse: A function of its module, which the other process imports.
+            body: As `read`.
+            query: For `parse`.
+            seconds: What is left until the deadline.
+            json_bytes: How much of the body is JSON.
+
+        Raises:
+            InvalidInput, DeadlineExceeded, NotReady: As `JsonProcess.parse`.
+        """
+        if json_bytes > LARGE_JSON_BYTES:
+            parsed = await self._json.parse(parse, body, query, seconds)
+            return lambda: parsed
+        return lambda: parse(body, query, self._limits)
 
     async def _in_time(self, chunks: list[bytes], incoming: Incoming, seconds: float) -> None:
         if incoming.whole:  # as usual: no timer is needed

@@ -75,23 +75,22 @@ class Asked:
     raw_outputs: frozenset[str] | None  # names of outputs wished as raw data; None: all of them
 
 
-def parse_infer(body: bytes, json_bytes: str | None, model_name: str, limits: Limits) -> Asked:
+def parse_infer(body: bytes, json_bytes: str, limits: Limits) -> Asked:
     """The request of a body.
 
     Args:
         body: The JSON, and the raw tensors behind it.
-        json_bytes: The header that says how long the JSON is; None: it is all of the body.
-        model_name: Of the path.
+        json_bytes: How many of them are JSON, from `json_end`.
         limits: Bound the contacts.
 
     Raises:
         InvalidInput: Not the protocol's form, or tensors that are not the convention's.
         TooLarge: More contacts than the limit.
     """
-    end = _json_end(body, json_bytes)
+    end = int(json_bytes)
     envelope = _envelope(body[:end])
-    if envelope.model_name not in (None, model_name):
-        raise InvalidInput(f"expected the model's name of the path, {model_name}, got {envelope.model_name!r:.80}")
+    if envelope.model_name not in (None, NAME):
+        raise InvalidInput(f"expected the model's name of the path, {NAME}, got {envelope.model_name!r:.80}")
     parameters = dict(envelope.parameters or {})
     all_raw = _flag(parameters, RAW_OUTPUTS, default=False)
     raw = {output.name: _wants_raw(output, all_raw) for output in envelope.outputs or []}
@@ -102,9 +101,22 @@ def parse_infer(body: bytes, json_bytes: str | None, model_name: str, limits: Li
     return Asked(request, envelope.id, None if all_raw and not raw else raw_outputs)
 
 
-def parse_large(body: bytes, json_bytes: str, limits: Limits) -> Asked:
-    """`parse_infer` as the process that parses large JSON calls it; an empty header stands for none."""
-    return parse_infer(body, json_bytes or None, NAME, limits)
+def json_end(body: bytes, json_bytes: str | None) -> int:
+    """How many bytes of a body are JSON.
+
+    Args:
+        body: All of it.
+        json_bytes: The header that says so; None: there is none, and all of the body is.
+
+    Raises:
+        InvalidInput: The header is no such number.
+    """
+    if json_bytes is None:
+        return len(body)
+    digits = json_bytes.isascii() and json_bytes.isdecimal() and len(json_bytes) <= 20
+    if not digits or int(json_bytes) > len(body):
+        raise InvalidInput(f"expected {JSON_BYTES_HEADER} of 0 to {len(body)}, got {json_bytes!r:.40}")
+    return int(json_bytes)
 
 
 def write_answer(fields: Mapping[str, Any], tensors: Sequence[Tensor], asked: Asked) -> tuple[bytes, int | None]:
@@ -132,15 +144,6 @@ def write_answer(fields: Mapping[str, Any], tensors: Sequence[Tensor], asked: As
     echoed = {} if asked.id is None else {"id": asked.id}
     text = orjson.dumps({**fields, **echoed, "outputs": outputs}, option=orjson.OPT_SERIALIZE_NUMPY)
     return b"".join([text, *raw]), len(text) if raw else None
-
-
-def _json_end(body: bytes, json_bytes: str | None) -> int:
-    if json_bytes is None:
-        return len(body)
-    digits = json_bytes.isascii() and json_bytes.isdecimal() and len(json_bytes) <= 20
-    if not digits or int(json_bytes) > len(body):
-        raise InvalidInput(f"expected {JSON_BYTES_HEADER} of 0 to {len(body)}, got {json_bytes!r:.40}")
-    return int(json_bytes)
 
 
 def _envelope(text: bytes) -> InferBody:

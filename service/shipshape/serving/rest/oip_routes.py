@@ -18,10 +18,10 @@ from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.model import Model
 from shipshape.serving.oip import models
 from shipshape.serving.oip.inference import Inference, submit
-from shipshape.serving.rest.bodies import LARGE_JSON_BYTES, Bodies
+from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.headers import TIMEOUT_HEADER, check_encoding, media_type, timeout_s
 from shipshape.serving.rest.incoming import Incoming
-from shipshape.serving.rest.oip_bodies import JSON_BYTES_HEADER, Asked, parse_infer, parse_large, write_answer
+from shipshape.serving.rest.oip_bodies import JSON_BYTES_HEADER, Asked, json_end, parse_infer, write_answer
 from shipshape.serving.rest.problems import ID_HEADER, STATUS, identify, retry_headers
 from shipshape.serving.rest.requests import JSON, PACKED
 from shipshape.serving.rest.routes import SMALL_BYTES, SMALL_SCAN
@@ -116,7 +116,9 @@ class OipRoutes:
         deadline = self._core.deadline_in(seconds)
         with self._clients.share(incoming.client) as share:
             async with self._bodies.read(incoming, seconds) as body:
-                parse = await self._parser(body, request.headers.get(JSON_BYTES_HEADER), deadline)
+                end = json_end(body, request.headers.get(JSON_BYTES_HEADER))
+                left = self._core.seconds_until(deadline)
+                parse = await self._bodies.parser(parse_infer, body, str(end), left, json_bytes=end)
 
                 def begin() -> tuple[Asked, Inference]:
                     """Parse and queue; in a thread of its own where the body is large."""
@@ -129,14 +131,6 @@ class OipRoutes:
         if inference.bulky or len(inference.contact_ids) > SMALL_SCAN:
             return await run_in_threadpool(self._answer, model, asked, inference, outcome)
         return self._answer(model, asked, inference, outcome)
-
-    async def _parser(self, body: bytes, json_bytes: str | None, deadline: float) -> Callable[[], Asked]:
-        """Gives the parsed body: large JSON is parsed before, in another process, all else when it is called."""
-        if json_bytes is None and len(body) > LARGE_JSON_BYTES:
-            seconds = self._core.seconds_until(deadline)
-            parsed = await self._bodies.json.parse(parse_large, body, "", seconds)
-            return lambda: parsed
-        return lambda: parse_infer(body, json_bytes, models.NAME, self._core.limits)
 
     async def _unknown(self, request: Request, _: Outcome) -> Response:
         raise HTTPException(404, f"expected a path of the Open Inference Protocol, got {request.url.path!r:.80}")

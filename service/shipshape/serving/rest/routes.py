@@ -14,7 +14,7 @@ from shipshape.serving.faults import FaultKind, fault_of
 from shipshape.serving.load_report import HTTP_HEADER, as_text
 from shipshape.serving.model import Order, Reply
 from shipshape.serving.rest import answers
-from shipshape.serving.rest.bodies import LARGE_JSON_BYTES, Bodies
+from shipshape.serving.rest.bodies import Bodies
 from shipshape.serving.rest.headers import TIMEOUT_NAME, check_encoding, media_type, timeout_s
 from shipshape.serving.rest.incoming import FromRequest, Incoming
 from shipshape.serving.rest.json_process import Parse
@@ -101,7 +101,7 @@ class Routes:
         check_encoding(incoming.header(b"content-encoding"))
         kind = media_type(incoming.header(b"content-type"), *CONTACT_FORMS)
         form, deadline = CONTACT_FORMS[kind], self._core.deadline_in(seconds)
-        self._core.sheds(form.lane(incoming.query), deadline)
+        self._core.check(form.lane(incoming.query), deadline)
         async with self._bodies.read(incoming, seconds) as body:
             parse = await self._parser(kind, form.parse, body, incoming.query, deadline)
 
@@ -125,7 +125,7 @@ class Routes:
         form, deadline = SCAN_FORMS[kind], self._core.deadline_in(seconds)
         if kind == PACKED:
             outcome.contacts = announced_contacts(incoming.query)
-        self._core.sheds(form.lane(incoming.query), deadline)
+        self._core.check(form.lane(incoming.query), deadline)
         async with self._bodies.read(incoming, seconds) as body:
             parse = await self._parser(kind, form.parse, body, incoming.query, deadline)
 
@@ -148,11 +148,8 @@ class Routes:
     async def _parser(
         self, kind: str, parse: Parse[T], body: bytes, query: str, deadline: float
     ) -> Callable[[], T]:
-        """Gives the parsed body: large JSON is parsed before, in another process, all else when it is called."""
-        if kind == JSON and len(body) > LARGE_JSON_BYTES:
-            parsed = await self._bodies.json.parse(parse, body, query, self._core.seconds_until(deadline))
-            return lambda: parsed
-        return lambda: parse(body, query, self._core.limits)
+        json_bytes, left = len(body) if kind == JSON else 0, self._core.seconds_until(deadline)
+        return await self._bodies.parser(parse, body, query, left, json_bytes=json_bytes)
 
     async def _model(self, _incoming: Incoming, _: Outcome, _share: Share) -> Response:
         value = answers.from_model(self._core.model(), self._core.limits, self._timeouts)
