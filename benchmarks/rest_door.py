@@ -59,7 +59,7 @@ class AtOnce(Core):
     def model(self):
         """None is needed."""
 
-    def sheds(self, lane, deadline) -> None:
+    def check(self, lane, deadline) -> None:
         """Nothing is refused."""
 
     def submit(self, model, order, deadline):
@@ -78,7 +78,7 @@ class AtOnce(Core):
 class Full(AtOnce):
     """A core that has no place left."""
 
-    def sheds(self, lane, deadline) -> None:
+    def check(self, lane, deadline) -> None:
         """Refused before the body is read."""
         self.submit(None, None, deadline)
 
