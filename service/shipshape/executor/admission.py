@@ -34,8 +34,9 @@ def settle_rungs(entries: Sequence[Entry], costs: Costs, *, wait: float, slack: 
     else:
         if wait > 0:  # with nobody before it, let it try: costs are learned from what runs
             _refuse(wait, alone, slack)
+    why = why_cheaper(full, slack) if place else ""
     for entry in entries:
-        entry.move_to(place, costs, why_cheaper(full, slack))
+        entry.move_to(place, costs, why)
 
 
 def check_room(wanted: int, lane: Lane, *, limit: int, depth: int, wait: float) -> None:

@@ -12,12 +12,12 @@ _NO_SPREAD = 1e-9  # of sizes: below it, nothing is known of a slope
 class _Line:
     """Exponentially weighted regression of seconds on size."""
 
-    __slots__ = ("covariance", "seconds", "seen", "size", "variance")
+    __slots__ = ("covariance", "seconds", "seen", "size", "slope", "variance")
 
     def __init__(self) -> None:
         self.seen = 0
         self.size = self.seconds = 0.0  # means
-        self.variance = self.covariance = 0.0
+        self.variance = self.covariance = self.slope = 0.0
 
     def learn(self, size: float, seconds: float) -> None:
         """One more observation."""
@@ -30,11 +30,11 @@ class _Line:
         self.seconds += weight * off_seconds
         self.variance = (1.0 - weight) * (self.variance + weight * off_size * off_size)
         self.covariance = (1.0 - weight) * (self.covariance + weight * off_size * off_seconds)
+        self.slope = max(0.0, self.covariance / self.variance) if self.variance > _NO_SPREAD else 0.0
 
     def at(self, size: float) -> float:
         """Seconds expected at this size, never less for more."""
-        slope = max(0.0, self.covariance / self.variance) if self.variance > _NO_SPREAD else 0.0
-        return max(0.0, self.seconds + slope * (size - self.size))
+        return max(0.0, self.seconds + self.slope * (size - self.size))
 
 
 class Costs:
@@ -44,17 +44,19 @@ class Costs:
     """
 
     def __init__(self) -> None:
-        self._lines: weakref.WeakKeyDictionary[object, _Line] = weakref.WeakKeyDictionary()
+        # By id: looking into a dictionary of weak keys takes longer than all else that admission does.
+        self._lines: dict[int, _Line] = {}
 
     def learn(self, timed: object, size: float, seconds: float) -> None:
         """It took `seconds` for work of this size."""
-        if (line := self._lines.get(timed)) is None:
-            line = self._lines[timed] = _Line()
+        if (line := self._lines.get(id(timed))) is None:
+            line = self._lines[id(timed)] = _Line()
+            weakref.finalize(timed, self._lines.pop, id(timed), None)
         line.learn(size, seconds)
 
     def of(self, timed: object, size: float) -> float:
         """Seconds that it will probably take; 0 for what was never timed."""
-        line = self._lines.get(timed)
+        line = self._lines.get(id(timed))
         return line.at(size) if line is not None else 0.0
 
     def each(self, timed: Iterable[object], size: float) -> list[float]:

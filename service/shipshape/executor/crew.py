@@ -33,6 +33,10 @@ class Hand(ABC):
     def flush(self) -> None:
         """Let the worker have what it was given."""
 
+    def drop(self, entry: Entry) -> None:
+        """The entry has ended."""
+        self.given.pop(id(entry), None)
+
     @abstractmethod
     def take_back(self, entry: Entry) -> None:
         """Nobody wants this entry any more; it ends at the next stage boundary."""

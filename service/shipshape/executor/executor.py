@@ -227,7 +227,7 @@ class Executor:
         with self._lock:
             for entry in entries:
                 entry.over = True
-                hand.given.pop(id(entry), None)
+                hand.drop(entry)
                 for timed, seconds in entry.timed:
                     self._costs.learn(timed, entry.task.size, seconds)
             self.give_out()

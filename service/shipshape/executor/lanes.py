@@ -48,6 +48,10 @@ class Queues(Generic[T]):
         """Of all work that goes before new work of this lane."""
         return sum(self._seconds[other] for other in UP_TO[lane])
 
+    def count(self, lane: Lane) -> int:
+        """Of all work that goes before new work of this lane."""
+        return sum(len(self._lanes[other]) for other in UP_TO[lane])
+
     def append(self, lane: Lane, item: T, seconds: float) -> None:
         """Behind all others of its lane; `seconds` of work."""
         self._lanes[lane][item] = seconds

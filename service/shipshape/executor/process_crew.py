@@ -165,15 +165,13 @@ class ProcessCrew(Crew):
             self._lost(hand)
             return
         hand.heard()
-        reports = [message for message in messages if isinstance(message, Report)]
-        if reports:
-            self._owner.ended(hand, [self._end(hand, report) for report in reports])
-        for message in messages:
-            if not isinstance(message, Report):  # the first
-                hand.process_id = message
-                self._owner.give_out()
-                if self.whole:
-                    self._whole.set()
+        if messages and hand.process_id is None:
+            hand.process_id = messages.pop(0)
+            self._owner.give_out()
+            if self.whole:
+                self._whole.set()
+        if messages:
+            self._owner.ended(hand, [self._end(hand, Report(*message)) for message in messages])
 
     def _end(self, hand: ProcessHand, report: Report) -> Entry:
         entry = hand.given[report.number]

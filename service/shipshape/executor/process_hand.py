@@ -10,11 +10,11 @@ from contextlib import suppress
 
 from shipshape.executor.crew import WEDGED_S, Hand
 from shipshape.executor.entry import Entry
-from shipshape.executor.lanes import UP_TO, Lane
+from shipshape.executor.lanes import Lane, Queues
 from shipshape.executor.messages import Inbox, packed
 
-SOON_S = 0.008  # of work before it, at which an entry is given to a worker that is busy: it need not wait for us
-MOST = 4  # entries that it is given at a time
+SOON_S = 0.012  # of work before it, at which an entry is given to a worker that is busy: it need not wait for us
+MOST = 6  # entries that it is given at a time
 
 
 class ProcessHand(Hand):
@@ -28,6 +28,7 @@ class ProcessHand(Hand):
         self.unsent = bytearray()
         self.process_id: int | None = None  # known once it has said so
         self.born = time.monotonic()
+        self._ahead: Queues[Entry] = Queues()
         self._closed = False
         self._sending = threading.Lock()
         self._wake = wake
@@ -39,9 +40,15 @@ class ProcessHand(Hand):
             self._heard = time.monotonic()
         self.given[id(entry)] = entry
         task = entry.task
+        self._ahead.append(task.lane, entry, entry.left)
         message = packed((id(entry), task.work, task.deadline, entry.place, entry.why))
         with self._sending:
             self.unsent += message
+
+    def drop(self, entry: Entry) -> None:
+        """As `Hand.drop`."""
+        super().drop(entry)
+        self._ahead.remove(entry.task.lane, entry)
 
     def take_back(self, entry: Entry) -> None:
         """Nobody wants this entry any more."""
@@ -54,10 +61,10 @@ class ProcessHand(Hand):
         """How many go before; None where it will not be free so soon that one more had better be there by then."""
         if not self.alive:
             return None
-        ahead = [entry.left for entry in self.given.values() if entry.task.lane in UP_TO[lane]]
-        if ahead and (len(ahead) >= MOST or sum(ahead) > SOON_S):
+        count = self._ahead.count(lane)
+        if count and (count >= MOST or self._ahead.seconds(lane) > SOON_S):
             return None
-        return len(ahead)
+        return count
 
     def is_stuck(self, now: float) -> bool:
         """Whether it has work and has said nothing for `WEDGED_S`."""
@@ -78,7 +85,7 @@ class ProcessHand(Hand):
 
     def seconds(self, lane: Lane, now: float) -> float:
         """As `Hand.seconds`, less what must have been done by now."""
-        expected = super().seconds(lane, now)
+        expected = self._ahead.seconds(lane)
         return max(0.0, expected - self.silent_s(now)) if expected else 0.0
 
     def flush(self) -> None:

@@ -18,7 +18,10 @@ from shipshape.executor.messages import Inbox, packed
 from shipshape.executor.ticket import Task
 from shipshape.executor.worker import Worker
 
-HOLD_S = 0.004  # at most, for a report to be sent with the next: while all is busy, the service is woken less
+# For a report to be sent with the next, while there is more work: to be woken for each would cost the service, and
+# the worker on the same core, more than all that it then does.
+HOLD_S = 0.008
+HOLD_SHARE = 0.25  # and no more of the time that is left until the deadline
 NICE = 5  # on a busy core the doors go first: refusals are soon given, and answers soon sent
 LEARNED = 4  # one in so many entries is learned from: costs change slowly, and learning takes time
 
@@ -89,14 +92,14 @@ class SocketMailbox:
         self._ended = 0
         self._free = 0.0  # when the last one ended
         self._reports: list[bytes] = []  # that are not sent yet
-        self._held_since = 0.0
+        self._send_at = 0.0
         self._entries: dict[int, Entry] = {}
         self._poll = select.poll()
         self._poll.register(connection, select.POLLIN)
 
     def read(self, *, wait: bool) -> Sequence[Entry] | None:
         """As `Mailbox.read`."""
-        if wait or (self._reports and time.monotonic() - self._held_since > HOLD_S):
+        if wait or (self._reports and time.monotonic() >= self._send_at):
             self._send()
         if not wait and not self._poll.poll(0):
             return ()
@@ -123,18 +126,19 @@ class SocketMailbox:
                 self._prepared.costs.learn(timed, entry.task.size, seconds)
         error = entry.ticket.future.exception()
         result = entry.ticket.future.result() if error is None else as_message(error)
-        self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, took), entry.task.lane)
+        urgent = entry.task.lane is Lane.COLLISION
+        hold = 0.0 if urgent else min(HOLD_S, HOLD_SHARE * (entry.task.deadline - now))
+        self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, took), now + hold)
 
-    def _tell(self, report: Report, lane: Lane = Lane.COLLISION) -> None:
-        """Send a report, or hold it back for a moment while there is more work that is no more urgent."""
+    def _tell(self, report: Report, send_at: float = 0.0) -> None:
+        """Send a report, or hold it back until then while there is more work."""
         try:
-            message = packed(report)
+            message = packed(tuple(report))  # of plain values: one comes with every entry
         except Exception as error:  # an answer that cannot travel
-            message = packed(Report(report.number, as_message(error)))
-        if not self._reports:
-            self._held_since = time.monotonic()
+            message = packed(tuple(Report(report.number, as_message(error))))
+        self._send_at = min(self._send_at, send_at) if self._reports else send_at
         self._reports.append(message)
-        if not self._entries or lane is Lane.COLLISION:
+        if not self._entries or self._send_at <= time.monotonic():
             self._send()
 
     def _send(self) -> None:

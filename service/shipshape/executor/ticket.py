@@ -85,11 +85,7 @@ class Ticket(Generic[R]):
         self.degraded = False
         self.settled = False
         self.future: Future[R] = Future()
-        self.future.add_done_callback(self._note)
         self._clock = clock
-
-    def _note(self, _: Future[R]) -> None:
-        self.settled = True
 
     def remaining(self) -> float:
         """Seconds left until the deadline, never negative."""
@@ -120,10 +116,12 @@ class Ticket(Generic[R]):
 
     def succeed(self, answer: R) -> None:
         """Settle with the answer, unless settled already."""
+        self.settled = True  # before: the future tells everybody
         with suppress(InvalidStateError):
             self.future.set_result(answer)
 
     def fail(self, error: Exception) -> None:
         """Settle with an error, unless settled already."""
+        self.settled = True
         with suppress(InvalidStateError):
             self.future.set_exception(error)

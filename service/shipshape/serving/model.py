@@ -31,8 +31,12 @@ class Reply(Generic[C]):
     stage_ms: Mapping[str, float]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """One comes with every contact, and dataclasses with slots are slow to pickle."""
-        return Reply, (self.content, self.rung, self.stage_ms)
+        """One comes with every contact, and dataclasses with slots, as enumerations, are slow to pickle."""
+        return _reply, (self.content, self.rung.value, self.stage_ms)
+
+
+def _reply(content: Any, rung: str, stage_ms: Mapping[str, float]) -> Reply[Any]:
+    return Reply(content, Rung(rung), stage_ms)
 
 
 Encode = Callable[[Answer, Wishes], C]  # a function of a module, so that it can be named to a worker process
