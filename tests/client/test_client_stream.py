@@ -9,10 +9,10 @@ import grpc
 import numpy as np
 import pytest
 
-from client.scripted import PATIENCE, Scripted, gone, serving
+from client.scripted import PATIENCE, Scripted, gone, of_any_shape, serving
 from serving.fakes import until
 from shipshape.client import AsyncClient, Client, Contact
-from shipshape.errors import DeadlineExceeded, InvalidInput, Unauthenticated
+from shipshape.errors import DeadlineExceeded, InvalidInput, SettingsError, Unauthenticated
 
 POINTS = np.zeros((12, 3), np.float32)
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "not_ready")
@@ -115,6 +115,26 @@ def test_what_no_other_call_would_mend_ends_the_stream(aboard):
     aboard.locked = True
     with Client(aboard.url, timeout_s=PATIENCE) as client, pytest.raises(Unauthenticated):
         list(client.stream(scans(2)))
+
+
+def test_a_scan_that_no_message_can_tell_does_not_end_the_stream(aboard):
+    flat = [of_any_shape(POINTS.ravel())]
+    with Client(aboard.url, timeout_s=PATIENCE) as client:
+        answers = {each.sequence: each for each in client.stream([*scans(1), flat, *scans(1), flat])}
+    assert [len(answers[sequence].results) for sequence in range(4)] == [2, 0, 2, 0]
+    for sequence in (1, 3):
+        assert isinstance(answers[sequence].error, InvalidInput)
+        assert "got (36,)" in str(answers[sequence].error)
+    assert [request.sequence for request in aboard.asked] == [0, 2]
+
+
+@pytest.mark.parametrize("window", [0, -1])
+def test_a_window_of_no_scan_is_refused(aboard, window):
+    with (
+        Client(aboard.url, timeout_s=PATIENCE) as client,
+        pytest.raises(SettingsError, match=f"expected a window of 1 scan or more, got {window}"),
+    ):
+        list(client.stream(scans(1), window=window))
 
 
 def test_what_the_source_raises_comes_after_the_answers(aboard):

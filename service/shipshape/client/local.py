@@ -6,7 +6,7 @@ Nothing of it is imported before a client is opened that asks for it.
 import asyncio
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from shipshape.client.answers import LOCAL, Answer, Refusal
 from shipshape.client.wishes import Wishes
 from shipshape.errors import DeadlineExceeded, InvalidInput, ShipshapeError
 from shipshape.types import Contact, Options, Recognition
-
-if TYPE_CHECKING:
-    pass
 
 SLOWER = 2.0  # times its last answer: what is kept of a deadline for one more
 

@@ -15,7 +15,7 @@ from shipshape.client.local import Local
 from shipshape.client.messages import from_wishes, to_results
 from shipshape.client.route import choose
 from shipshape.client.wishes import Wishes
-from shipshape.errors import DeadlineExceeded, ShipshapeError, Unreachable
+from shipshape.errors import DeadlineExceeded, InvalidInput, ShipshapeError, Unreachable
 from shipshape.types import Contact
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -55,6 +55,7 @@ class Streaming:
         self._fresh: asyncio.Queue[_Scan | None] = asyncio.Queue()  # None: there are no more
         self._ended = False
         self._waiting: dict[int, _Scan] = {}  # taken and not answered, by sequence
+        self._wrong: dict[int, ScanAnswer] = {}  # of these, what no message can tell
 
     async def answers(self, scans: Scans) -> AsyncIterator[ScanAnswer]:
         """The answer to each scan, in the order in which they end; raises what `scans` raises, after the last."""
@@ -108,8 +109,8 @@ class Streaming:
         try:
             while True:
                 await asyncio.wait({reading}, timeout=LOOK_S)
-                if writing.done():
-                    writing.result()  # raises what a contact was wrong with
+                for unwritten in self._unwritten(writing):
+                    yield unwritten
                 if late := self._late(GRACE_S):
                     calls.route.told_silence(time.monotonic(), _silence(calls.endpoint.url), self._timeout_s)
                     for scan in late:
@@ -148,13 +149,28 @@ class Streaming:
     async def _write(self, call: Any, calls: Calls) -> None:
         try:
             for scan in [*self._waiting.values()]:  # those that a call before this one did not answer
-                await call.write(self._message(scan, calls))
+                await self._write_one(call, calls, scan)
             while not self._ended:
                 if (fresh := await self._take(None)) is not None:
-                    await call.write(self._message(fresh, calls))
+                    await self._write_one(call, calls, fresh)
             await call.done_writing()
         except (aio.AioRpcError, asyncio.InvalidStateError):
             return  # the call broke, and whoever reads from it is told why
+
+    async def _write_one(self, call: Any, calls: Calls, scan: _Scan) -> None:
+        try:
+            message = self._message(scan, calls)
+        except InvalidInput as error:
+            self._wrong[scan.sequence] = ScanAnswer(scan.sequence, (), error)
+        else:
+            await call.write(message)
+
+    def _unwritten(self, writing: asyncio.Future[None]) -> list[ScanAnswer]:
+        """The answers to scans that no message can tell; raises what else kept them from being written."""
+        if writing.done():
+            writing.result()
+        sequences = self._wrong.keys() & self._waiting.keys()
+        return [self._finish(self._waiting[each], self._wrong.pop(each)) for each in sequences]
 
     def _message(self, scan: _Scan, calls: Calls) -> pb.RecogniseStreamRequest:
         left_s = scan.deadline - time.monotonic() - (calls.route.round_trip_s or 0.0)
