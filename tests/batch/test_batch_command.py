@@ -1,4 +1,5 @@
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -136,6 +137,21 @@ def test_a_copy_of_an_input_has_no_rows_of_its_own(inputs, tmp_path, engine):
     assert len(table_of(tmp_path / "out")) == 25
     (copy,) = [record for record in summary_of(tmp_path / "out")["inputs"] if record["same_as"]]
     assert (Path(copy["name"]).name, Path(copy["same_as"]).name) == ("z.npz", "a.npz")
+
+
+def test_links_that_lead_round_in_circles_are_followed_once(inputs, tmp_path, engine):
+    for name in ("round", "and_round"):
+        (inputs / name).symlink_to(inputs)
+    assert run(inputs, "--out", tmp_path / "out") == 1
+    assert len(summary_of(tmp_path / "out")["inputs"]) == 3
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path, engine):
+    os.mkfifo(tmp_path / "pipe.pcd")
+    assert run(tmp_path / "pipe.pcd", SCAN, "--out", tmp_path / "out") == 1
+    pipe, scan = summary_of(tmp_path / "out")["inputs"]
+    assert pipe["error"].endswith("pipe.pcd, got: something that is neither file nor folder")
+    assert scan["contacts"] == 6
 
 
 def test_names_of_clusters_are_kept(tmp_path, engine):
