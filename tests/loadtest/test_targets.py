@@ -154,6 +154,11 @@ ANSWERS = {
     "expired": (504, b"gateway", Outcome.EXPIRED),
     "failed": (500, b"[]", Outcome.ERROR),
     "nonsense": (200, b"{", Outcome.ERROR),
+    "errors without their details": (
+        200,
+        b'{"outputs":[{"name":"error","data":["internal"]},{"name":"detail","data":[]}]}',
+        Outcome.ERROR,
+    ),
     "another protocol": (200, b'{"outputs":[{}]}', Outcome.ERROR),
 }
 
