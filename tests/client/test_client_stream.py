@@ -2,6 +2,8 @@
 
 import asyncio
 import itertools
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -16,6 +18,18 @@ from shipshape.errors import DeadlineExceeded, InvalidInput, SettingsError, Unau
 
 POINTS = np.zeros((12, 3), np.float32)
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "not_ready")
+
+# A program that leaves a stream whose source waits for something that never comes.
+BLOCKED = """
+import queue, sys
+import numpy as np
+from shipshape.client import Client, Contact
+def source():
+    yield [Contact(np.zeros((12, 3), np.float32))]
+    queue.Queue().get()
+with Client(sys.argv[1], timeout_s=20) as client:
+    print(next(client.stream(source())).results[0].vessel)
+"""
 
 
 def scans(count, contacts=2):
@@ -165,6 +179,12 @@ def test_a_stream_that_is_left_early_is_cancelled(aboard):
             return len(aboard.asked)
 
     assert asyncio.run(run()) >= 3
+
+
+def test_a_source_that_blocks_for_ever_keeps_no_program_from_ending(aboard):
+    command = [sys.executable, "-c", BLOCKED, aboard.url]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True, timeout=PATIENCE)
+    assert ran.stdout == "aboard\n"
 
 
 def test_an_error_of_a_message_does_not_end_the_stream(doors):
