@@ -139,6 +139,16 @@ def test_a_copy_of_an_input_has_no_rows_of_its_own(inputs, tmp_path, engine):
     assert (Path(copy["name"]).name, Path(copy["same_as"]).name) == ("z.npz", "a.npz")
 
 
+def test_a_name_that_says_no_kind_does_not_hide_the_same_content_under_another(tmp_path, engine):
+    for name in ("a.dat", "b.npz"):
+        shutil.copy(SCAN, tmp_path / name)
+    assert run(tmp_path / "a.dat", tmp_path / "b.npz", "--out", tmp_path / "out") == 1
+    first, second = summary_of(tmp_path / "out")["inputs"]
+    assert first["error"].startswith("expected a file ending in .npy .npz")
+    assert first["error"].endswith(".parquet .bag .db3 .mcap, got a.dat")
+    assert second["contacts"] == 6
+
+
 def test_links_that_lead_round_in_circles_are_followed_once(inputs, tmp_path, engine):
     for name in ("round", "and_round"):
         (inputs / name).symlink_to(inputs)

@@ -19,6 +19,7 @@ from shipshape.client.calls import Calls
 from shipshape.client.failures import KINDS, error_of_contact
 from shipshape.client.messages import from_contact
 from shipshape.errors import (
+    DeadlineExceeded,
     FileError,
     InvalidInput,
     ServiceFault,
@@ -28,6 +29,7 @@ from shipshape.errors import (
     Unreachable,
 )
 from shipshape.quantised import dequantise, quantise
+from shipshape.sample import sample_contact
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.grpc import server
 from shipshape.serving.grpc.server import PING_INTERVAL_MS
@@ -262,3 +264,14 @@ def test_what_no_service_answers_is_computed_here():
     assert isinstance(results[1].error, Unprocessable)
     assert results[0].restored is None
     assert streamed.results[0].vessel == answer.vessel
+
+
+@needs_models
+def test_what_is_computed_here_has_its_deadline_too():
+    many = [sample_contact()] * 256  # none takes less than a millisecond
+    with Client(local=MODELS) as client:
+        with pytest.raises(DeadlineExceeded, match="expected an answer of this process in time, got none"):
+            client.scan(many, timeout_s=0.05)
+        (streamed,) = client.stream([many], timeout_s=0.05)
+        assert isinstance(streamed.error, DeadlineExceeded)
+        assert client.recognise(many[0], timeout_s=PATIENCE).endpoint == "local"

@@ -50,6 +50,11 @@ class Inputs:
         for path, record in zip(self._paths, self.records, strict=True):
             if record.error:
                 continue
+            if not (
+                path.is_dir() or _is_known(path)
+            ):  # first: of two names for one content, it may be the wrong one
+                record.error = f"expected a file ending in {' '.join([*FILES, *RECORDINGS])}, got {path.name}"
+                continue
             try:
                 record.sha256 = _digest(path)
             except OSError as error:
@@ -99,8 +104,12 @@ def _within(folder: Path, searched: set[Path]) -> Iterator[Path]:
     for entry in entries:
         if entry.is_dir() and not is_recording(entry):
             yield from _within(entry, searched)
-        elif entry.is_dir() or entry.suffix.lower() in {*FILES, *RECORDINGS}:
+        elif entry.is_dir() or _is_known(entry):
             yield entry
+
+
+def _is_known(path: Path) -> bool:
+    return path.suffix.lower() in {*FILES, *RECORDINGS}
 
 
 def _files(path: Path) -> list[Path]:

@@ -15,7 +15,7 @@ from shipshape.client.attempts import Attempts
 from shipshape.client.calls import Calls
 from shipshape.client.endpoint import Endpoint, as_endpoint
 from shipshape.client.failures import RETRYABLE
-from shipshape.client.local import Local
+from shipshape.client.local import Local, within
 from shipshape.client.route import Route
 from shipshape.client.streaming import Scans, Streaming
 from shipshape.client.wishes import Wishes
@@ -195,6 +195,7 @@ class AsyncClient:
         contacts: int,
     ) -> T:
         opened, left_s, local = self._opened(), self._limit(timeout_s), self._local
+        deadline = time.monotonic() + left_s
         if local is None:
             return await Attempts(
                 [*opened], lambda route, s: send(opened[route], s), left_s, hedge=self._hedge
@@ -207,7 +208,7 @@ class AsyncClient:
             )
             with contextlib.suppress(*RETRYABLE, DeadlineExceeded):
                 return await attempts.run()
-        return await compute(local)
+        return await within(deadline, compute(local))
 
     async def _watch(self, calls: Calls) -> None:
         while True:

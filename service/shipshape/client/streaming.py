@@ -11,7 +11,7 @@ from grpc import aio
 from shipshape.client.answers import ScanAnswer
 from shipshape.client.calls import Calls
 from shipshape.client.failures import RETRYABLE, Silent, error_of, error_of_contact
-from shipshape.client.local import Local
+from shipshape.client.local import Local, within
 from shipshape.client.messages import from_wishes, to_results
 from shipshape.client.route import choose
 from shipshape.client.wishes import Wishes
@@ -193,7 +193,11 @@ class Streaming:
     async def _without_service(self, scan: _Scan) -> ScanAnswer:
         if self._local is None:
             return _late(scan, ", ".join(route.url for route in self._calls))
-        return ScanAnswer(scan.sequence, await self._local.scan(scan.contacts, self._wishes))
+        try:
+            results = await within(scan.deadline, self._local.scan(scan.contacts, self._wishes))
+        except DeadlineExceeded as error:
+            return ScanAnswer(scan.sequence, (), error)
+        return ScanAnswer(scan.sequence, results)
 
 
 def _late(scan: _Scan, where: str) -> ScanAnswer:
