@@ -207,6 +207,16 @@ def test_a_wrong_command_gets_one_sentence(tmp_path, capsys, arguments, sentence
     assert not (tmp_path / "out").exists()
 
 
+def test_results_are_not_compared_with_themselves(tmp_path, engine, capsys):
+    out = tmp_path / "out"
+    assert run(SCAN, "--out", out) == 0
+    capsys.readouterr()
+    assert run(SCAN, "--out", out, "--compare", out / ".." / "out") == 2
+    assert capsys.readouterr().err == (
+        f"shipshape: expected another folder in --compare than in --out, got {out} in both\n"
+    )
+
+
 def test_a_fault_in_a_reader_does_not_end_the_run(tmp_path, engine, monkeypatch, caplog):
     for name in ("a", "b"):
         np.save(tmp_path / f"{name}.npy", HULL + (name == "b"))
