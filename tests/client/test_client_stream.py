@@ -125,6 +125,20 @@ def test_a_silent_service_does_not_hold_the_stream(aboard):
     assert [type(answer.error).__mro__[1] for answer in answers] == [DeadlineExceeded] * 2
 
 
+def test_a_service_that_ends_every_call_is_not_asked_all_the_time():
+    class Ending(Scripted):
+        calls = 0
+
+        def RecogniseStream(self, requests, context):
+            self.calls += 1
+            return iter(())
+
+    with serving(Ending("aboard")) as service, Client(service.url, timeout_s=1.0) as client:
+        (answer,) = client.stream(scans(1))
+    assert isinstance(answer.error, DeadlineExceeded)
+    assert 2 <= service.calls <= 10  # the pause doubles; without one there are hundreds
+
+
 def test_what_no_other_call_would_mend_ends_the_stream(aboard):
     aboard.locked = True
     with Client(aboard.url, timeout_s=PATIENCE) as client, pytest.raises(Unauthenticated):

@@ -119,6 +119,7 @@ class Streaming:
                 if not reading.done():
                     continue
                 if (response := reading.result()) is aio.EOF:  # type: ignore[attr-defined]  # the stubs forget it
+                    self._note_the_end(calls)
                     return
                 reading = asyncio.ensure_future(call.read())
                 if (answered := self._waiting.get(response.sequence)) is not None:
@@ -131,6 +132,12 @@ class Streaming:
                 task.cancel()
             call.cancel()
             await asyncio.gather(writing, reading, return_exceptions=True)
+
+    def _note_the_end(self, calls: Calls) -> None:
+        """A service that ends the call while scans wait for it is left alone for a while, as one that broke it."""
+        if not self._ended or self._waiting.keys() - self._wrong.keys():
+            why = Unreachable(f"expected a stream of {calls.endpoint.url} that holds, got one that ended")
+            calls.route.told_failure(time.monotonic(), why)
 
     async def _explain(self, error: aio.AioRpcError, calls: Calls) -> ShipshapeError:
         """What ended a call; raised unless another call may go on."""
