@@ -1,6 +1,7 @@
 """The calls of `shipshape admin`: one request to the admin door of a service, its answer on stdout."""
 
 import argparse
+import http.client
 import json
 import sys
 import urllib.error
@@ -11,6 +12,7 @@ from shipshape.token_file import read_token
 
 OK, REFUSED = 0, 1
 PATIENCE_S = 120.0  # a swap loads and tries a whole bundle, on a loaded machine
+NEXT = "is --url the address of the service's SHIPSHAPE_ADMIN_PORT?"
 CALLS = {
     "status": ("GET", "/admin/status"),
     "swap": ("POST", "/admin/bundle"),
@@ -28,15 +30,19 @@ def admin(arguments: argparse.Namespace) -> int:
     request.add_header("Authorization", f"Bearer {read_token(arguments.token_file)}")
     request.add_header("Content-Type", "application/json")
     # No proxy: the door is on loopback, and whatever the environment names would learn the token.
-    http = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
-        with http.open(request, timeout=PATIENCE_S) as response:
+        with opener.open(request, timeout=PATIENCE_S) as response:
             print(json.dumps(json.load(response), indent=2))
     except urllib.error.HTTPError as error:
         with error:
             return _failed(_detail(error))
     except OSError as error:  # URLError is one
-        return _failed(f"expected an admin door at {arguments.url}, got: {getattr(error, 'reason', error)}")
+        return _failed(
+            f"expected an admin door at {arguments.url}, got: {getattr(error, 'reason', error)}: {NEXT}"
+        )
+    except (http.client.HTTPException, ValueError) as error:
+        return _failed(f"expected an admin door at {arguments.url}, got {type(error).__name__}: {NEXT}")
     return OK
 
 

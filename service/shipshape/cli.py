@@ -145,7 +145,7 @@ def _add_serve(commands: _Commands) -> None:
     parser.add_argument("--host", help="address to listen on (default: loopback)")
     parser.add_argument("--rest-port", type=int, help="0 picks a free one")
     parser.add_argument("--grpc-port", type=int, help="0 picks a free one")
-    parser.add_argument("--workers", type=int, help="threads that compute; 0 is one a core")
+    parser.add_argument("--workers", type=int, help="processes or threads that compute; 0 is one a core")
     _add_bundle_option(parser)
 
 
@@ -210,7 +210,10 @@ def _add_loadtest(commands: _Commands) -> None:
     )
     parser.add_argument("--duration", default="30s", metavar="TIME", help="of what counts (default: %(default)s)")
     parser.add_argument(
-        "--warmup", default="3s", metavar="TIME", help="sent before, not counted (default: %(default)s)"
+        "--warmup",
+        default="3s",
+        metavar="TIME",
+        help="sent before, not counted; 0s: nothing (default: %(default)s)",
     )
     _add_load_options(parser)
     parser.add_argument("--ca", type=Path, metavar="PEM", help="who signed the target's certificate")

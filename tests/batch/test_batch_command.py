@@ -1,4 +1,5 @@
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -138,6 +139,31 @@ def test_a_copy_of_an_input_has_no_rows_of_its_own(inputs, tmp_path, engine):
     assert (Path(copy["name"]).name, Path(copy["same_as"]).name) == ("z.npz", "a.npz")
 
 
+def test_a_name_that_says_no_kind_does_not_hide_the_same_content_under_another(tmp_path, engine):
+    for name in ("a.dat", "b.npz"):
+        shutil.copy(SCAN, tmp_path / name)
+    assert run(tmp_path / "a.dat", tmp_path / "b.npz", "--out", tmp_path / "out") == 1
+    first, second = summary_of(tmp_path / "out")["inputs"]
+    assert first["error"].startswith("expected a file ending in .npy .npz")
+    assert first["error"].endswith(".parquet .bag .db3 .mcap, got a.dat")
+    assert second["contacts"] == 6
+
+
+def test_links_that_lead_round_in_circles_are_followed_once(inputs, tmp_path, engine):
+    for name in ("round", "and_round"):
+        (inputs / name).symlink_to(inputs)
+    assert run(inputs, "--out", tmp_path / "out") == 1
+    assert len(summary_of(tmp_path / "out")["inputs"]) == 3
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path, engine):
+    os.mkfifo(tmp_path / "pipe.pcd")
+    assert run(tmp_path / "pipe.pcd", SCAN, "--out", tmp_path / "out") == 1
+    pipe, scan = summary_of(tmp_path / "out")["inputs"]
+    assert pipe["error"].endswith("pipe.pcd, got: something that is neither file nor folder")
+    assert scan["contacts"] == 6
+
+
 def test_names_of_clusters_are_kept(tmp_path, engine):
     other = HULL + np.float32([0, 30, 0])
     write_mcap(tmp_path / "a.mcap", [cloud(packed(np.concatenate([HULL, other]), np.repeat([7, 9], len(HULL))))])
@@ -179,6 +205,16 @@ def test_a_wrong_command_gets_one_sentence(tmp_path, capsys, arguments, sentence
     assert run(tmp_path / "hull.npy", "--out", tmp_path / "out", *arguments) == 2
     assert capsys.readouterr().err == f"shipshape: {sentence}\n"
     assert not (tmp_path / "out").exists()
+
+
+def test_results_are_not_compared_with_themselves(tmp_path, engine, capsys):
+    out = tmp_path / "out"
+    assert run(SCAN, "--out", out) == 0
+    capsys.readouterr()
+    assert run(SCAN, "--out", out, "--compare", out / ".." / "out") == 2
+    assert capsys.readouterr().err == (
+        f"shipshape: expected another folder in --compare than in --out, got {out} in both\n"
+    )
 
 
 def test_a_fault_in_a_reader_does_not_end_the_run(tmp_path, engine, monkeypatch, caplog):

@@ -12,9 +12,9 @@ from batch.written import cloud, packed, write_mcap
 from builders_recognition import side_of_hull
 from shipshape.batch import reading
 from shipshape.batch.method import Method
-from shipshape.batch.processes import AHEAD, run_ahead
+from shipshape.batch.processes import AHEAD, POINTS_AHEAD, run_ahead
 from shipshape.batch.reading import read
-from shipshape.batch.units import Chunk, Ending, Part, Source
+from shipshape.batch.units import Chunk, Cloud, Ending, Part, Source
 
 SHORT, LONG = 40, 240  # messages of 1.2 MB
 POINTS = 100_000
@@ -108,6 +108,23 @@ def test_reading_waits_for_the_workers():
         assert read_so_far - len(taken) <= AHEAD + 1
     assert [item.name for item in taken[:-1]] == [f"{'0' * 16}-{number:06d}" for number in range(50)]
     assert isinstance(taken[-1], Ending)
+
+
+def test_of_huge_clouds_fewer_are_read_ahead():
+    huge = Cloud(0, None, np.broadcast_to(np.float32(0), (POINTS_AHEAD // 2 + 1, 3)))  # takes no memory itself
+    read_so_far = 0
+
+    def chunks():
+        nonlocal read_so_far
+        for number in range(20):
+            read_so_far += 1
+            yield Chunk("0" * 64, number, [huge], 0.0)
+
+    def work(chunk):
+        return Part(chunk.sha256, chunk.name, 0.0, 0, 0, b"")
+
+    for taken, _ in enumerate(run_ahead(ThreadPoolExecutor(1), work, chunks(), 10), 1):
+        assert read_so_far - taken <= 1
 
 
 def test_chunks_hold_few_points(recordings, monkeypatch):

@@ -147,3 +147,13 @@ def test_laz_unpacks_to_what_las_holds():
     las, laz = (read_clusters(LIDAR / "laspy" / f"simple.{suffix}")[0] for suffix in ("las", "laz"))
     assert len(las) == 1065
     np.testing.assert_array_equal(las, laz)
+
+
+@pytest.mark.parametrize("lists", [False, True])
+def test_a_small_parquet_of_very_many_points_is_refused_before_it_is_unpacked(tmp_path, lists):
+    column = pa.array(np.zeros(2**20, np.float32))
+    column = pa.ListArray.from_arrays([0, len(column)], column) if lists else column
+    pq.write_table(pa.table(dict.fromkeys("xyz", column)), tmp_path / "flat.parquet")
+    assert (tmp_path / "flat.parquet").stat().st_size < 100_000
+    with pytest.raises(FileError, match="to unpack to at most 1048576 bytes, got 12582912"):
+        read_clusters(tmp_path / "flat.parquet", max_bytes=2**20)

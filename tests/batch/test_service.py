@@ -11,9 +11,10 @@ from oip.real import MODELS, real
 from serving.fakes import cluster, running
 from shipshape.batch.service import PAUSE_S, Service, to_recognition
 from shipshape.cli import main
-from shipshape.errors import SettingsError, ShipshapeError
+from shipshape.errors import SettingsError, ShipshapeError, TooLarge
 from shipshape.types import Contact, Options
 from shipshape.v1 import shipshape_pb2 as pb
+from shipshape.validation import ContactLimits, check_contact
 
 __all__ = ["real"]
 
@@ -92,6 +93,20 @@ def test_messages_hold_no_more_than_the_service_takes():
         service = Service(url_of(doors))
         groups = list(service._groups([Contact(cluster())] * 5))
     assert [len(group) for group in groups] == [2, 2, 1]
+
+
+@pytest.mark.parametrize("points", [100_000, 1_400_000, 2_000_000])  # over the limits of a contact, body, message
+def test_a_contact_that_is_too_large_is_refused_alone(points):
+    asked = []
+    with running() as doors:
+        service = Service(url_of(doors), sleep=asked.append)
+        large = Contact(np.ones((points, 3), np.float32))
+        answers = list(service.answers_of(Options(), restored=False)([Contact(cluster()), large]))
+    assert answers[0].vessel == "tug"
+    with pytest.raises(TooLarge) as here:
+        check_contact(large, ContactLimits())
+    assert answers[1] == str(here.value)  # as this machine says it
+    assert not asked
 
 
 def test_another_bundle_than_at_first_ends_the_run():

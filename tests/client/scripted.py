@@ -6,8 +6,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import grpc
+import numpy as np
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
+from shipshape.types import Contact
 from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.v1 import shipshape_pb2_grpc
 
@@ -114,3 +116,10 @@ def gone():
     """The URL of a service that has stopped."""
     with serving(Scripted("gone")) as service:
         return service.url
+
+
+def of_any_shape(points):
+    """A contact as a program makes it that checks no types, as these tests do."""
+    contact = Contact(np.zeros((1, 3), np.float32))
+    object.__setattr__(contact, "points_level", points)
+    return contact

@@ -2,6 +2,8 @@
 
 import asyncio
 import random
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -30,6 +32,19 @@ from shipshape.errors import (
 
 CONTACT = Contact(np.zeros((12, 3), np.float32), "c7")
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "not_ready")
+FORKED = """
+import os, sys
+import numpy as np
+from shipshape.client import Client, Contact
+def ask():
+    with Client(sys.argv[1], timeout_s=5) as client:
+        print(client.recognise(Contact(np.zeros((12, 3), np.float32))).vessel, flush=True)
+ask()
+if (child := os.fork()) == 0:
+    ask()
+    os._exit(0)
+os.waitpid(child, 0)
+"""
 CROWDED = (grpc.StatusCode.RESOURCE_EXHAUSTED, "overloaded", 30)
 
 
@@ -188,6 +203,12 @@ def test_wishes_and_contacts_arrive(aboard):
 def test_a_client_outside_its_block_says_so(aboard):
     with pytest.raises(SettingsError, match=r"expected an open client, got one outside its `with` block"):
         Client(aboard.url).recognise(CONTACT)
+
+
+def test_a_process_forked_from_one_that_used_a_client_can_use_one(aboard):
+    command = [sys.executable, "-c", FORKED, aboard.url]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True, timeout=PATIENCE)
+    assert ran.stdout == "aboard\naboard\n"
 
 
 def test_threads_share_a_client(aboard):

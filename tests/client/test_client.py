@@ -10,15 +10,26 @@ import numpy as np
 import pytest
 import trustme
 
-from client.scripted import PATIENCE, Scripted, gone, serving
+from client.scripted import PATIENCE, Scripted, gone, of_any_shape, serving
 from serving.certificates import Files
 from serving.fakes import PNG, cluster, running
 from shipshape.client import LAN, SATELLITE, Client, Contact, Endpoint, Link, Rung, Wishes
 from shipshape.client.answers import Answer, Refusal
-from shipshape.client.failures import KINDS
+from shipshape.client.calls import Calls
+from shipshape.client.failures import KINDS, error_of_contact
 from shipshape.client.messages import from_contact
-from shipshape.errors import FileError, SettingsError, Unauthenticated, Unprocessable, Unreachable
+from shipshape.errors import (
+    DeadlineExceeded,
+    FileError,
+    InvalidInput,
+    ServiceFault,
+    SettingsError,
+    Unauthenticated,
+    Unprocessable,
+    Unreachable,
+)
 from shipshape.quantised import dequantise, quantise
+from shipshape.sample import sample_contact
 from shipshape.serving.faults import FaultKind
 from shipshape.serving.grpc import server
 from shipshape.serving.grpc.server import PING_INTERVAL_MS
@@ -75,6 +86,29 @@ def test_an_answer_is_the_message_with_types(doors):
     assert np.array_equal(answer.keypoints_level, CONTACT.points_level[:3])
     assert [*answer.stage_ms] == ["prior", "heading"]
     assert answer.endpoint == url_of(doors)
+
+
+@pytest.mark.parametrize("link", [LAN, SATELLITE])
+def test_points_of_another_shape_are_refused_before_they_pass_for_other_points(doors, link):
+    with_intensity = np.ones((300, 4), np.float32)  # its bytes would be those of 400 points
+    with (
+        Client(Endpoint(url_of(doors), link), timeout_s=PATIENCE) as client,
+        pytest.raises(InvalidInput, match=r"expected points of shape \(n, 3\), got \(300, 4\)"),
+    ):
+        client.recognise(of_any_shape(with_intensity))
+
+
+def test_a_client_that_cannot_be_opened_leaves_no_connection(tmp_path, monkeypatch):
+    closed = []
+
+    async def close(calls):
+        closed.append(calls.endpoint.url)
+
+    monkeypatch.setattr(Calls, "close", close)
+    locked = Endpoint("grpcs://127.0.0.1:1", ca=tmp_path / "none.pem")
+    with pytest.raises(FileError), Client("grpc://127.0.0.1:1", locked):
+        pytest.fail("it was opened")
+    assert closed == ["grpc://127.0.0.1:1"]
 
 
 def test_a_scan_keeps_its_order_and_its_errors(doors):
@@ -178,6 +212,12 @@ def test_every_kind_of_error_has_its_class():
     }
 
 
+def test_a_kind_of_error_that_only_a_newer_service_knows_is_a_fault_of_it():
+    error = error_of_contact(pb.ContactError(kind=99, message="expected tides, got none"))
+    assert isinstance(error, ServiceFault)
+    assert str(error) == "expected tides, got none"
+
+
 def test_the_service_takes_pings_as_often_as_links_send_them():
     for link in (LAN, SATELLITE):
         options = dict(link.channel_options())
@@ -224,3 +264,14 @@ def test_what_no_service_answers_is_computed_here():
     assert isinstance(results[1].error, Unprocessable)
     assert results[0].restored is None
     assert streamed.results[0].vessel == answer.vessel
+
+
+@needs_models
+def test_what_is_computed_here_has_its_deadline_too():
+    many = [sample_contact()] * 256  # none takes less than a millisecond
+    with Client(local=MODELS) as client:
+        with pytest.raises(DeadlineExceeded, match="expected an answer of this process in time, got none"):
+            client.scan(many, timeout_s=0.05)
+        (streamed,) = client.stream([many], timeout_s=0.05)
+        assert isinstance(streamed.error, DeadlineExceeded)
+        assert client.recognise(many[0], timeout_s=PATIENCE).endpoint == "local"

@@ -2,6 +2,8 @@
 
 import asyncio
 import itertools
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -9,13 +11,25 @@ import grpc
 import numpy as np
 import pytest
 
-from client.scripted import PATIENCE, Scripted, gone, serving
+from client.scripted import PATIENCE, Scripted, gone, of_any_shape, serving
 from serving.fakes import until
 from shipshape.client import AsyncClient, Client, Contact
-from shipshape.errors import DeadlineExceeded, InvalidInput, Unauthenticated
+from shipshape.errors import DeadlineExceeded, InvalidInput, SettingsError, Unauthenticated
 
 POINTS = np.zeros((12, 3), np.float32)
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "not_ready")
+
+# A program that leaves a stream whose source waits for something that never comes.
+BLOCKED = """
+import queue, sys
+import numpy as np
+from shipshape.client import Client, Contact
+def source():
+    yield [Contact(np.zeros((12, 3), np.float32))]
+    queue.Queue().get()
+with Client(sys.argv[1], timeout_s=20) as client:
+    print(next(client.stream(source())).results[0].vessel)
+"""
 
 
 def scans(count, contacts=2):
@@ -111,10 +125,44 @@ def test_a_silent_service_does_not_hold_the_stream(aboard):
     assert [type(answer.error).__mro__[1] for answer in answers] == [DeadlineExceeded] * 2
 
 
+def test_a_service_that_ends_every_call_is_not_asked_all_the_time():
+    class Ending(Scripted):
+        calls = 0
+
+        def RecogniseStream(self, requests, context):
+            self.calls += 1
+            return iter(())
+
+    with serving(Ending("aboard")) as service, Client(service.url, timeout_s=1.0) as client:
+        (answer,) = client.stream(scans(1))
+    assert isinstance(answer.error, DeadlineExceeded)
+    assert 2 <= service.calls <= 10  # the pause doubles; without one there are hundreds
+
+
 def test_what_no_other_call_would_mend_ends_the_stream(aboard):
     aboard.locked = True
     with Client(aboard.url, timeout_s=PATIENCE) as client, pytest.raises(Unauthenticated):
         list(client.stream(scans(2)))
+
+
+def test_a_scan_that_no_message_can_tell_does_not_end_the_stream(aboard):
+    flat = [of_any_shape(POINTS.ravel())]
+    with Client(aboard.url, timeout_s=PATIENCE) as client:
+        answers = {each.sequence: each for each in client.stream([*scans(1), flat, *scans(1), flat])}
+    assert [len(answers[sequence].results) for sequence in range(4)] == [2, 0, 2, 0]
+    for sequence in (1, 3):
+        assert isinstance(answers[sequence].error, InvalidInput)
+        assert "got (36,)" in str(answers[sequence].error)
+    assert [request.sequence for request in aboard.asked] == [0, 2]
+
+
+@pytest.mark.parametrize("window", [0, -1])
+def test_a_window_of_no_scan_is_refused(aboard, window):
+    with (
+        Client(aboard.url, timeout_s=PATIENCE) as client,
+        pytest.raises(SettingsError, match=f"expected a window of 1 scan or more, got {window}"),
+    ):
+        list(client.stream(scans(1), window=window))
 
 
 def test_what_the_source_raises_comes_after_the_answers(aboard):
@@ -145,6 +193,12 @@ def test_a_stream_that_is_left_early_is_cancelled(aboard):
             return len(aboard.asked)
 
     assert asyncio.run(run()) >= 3
+
+
+def test_a_source_that_blocks_for_ever_keeps_no_program_from_ending(aboard):
+    command = [sys.executable, "-c", BLOCKED, aboard.url]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True, timeout=PATIENCE)
+    assert ran.stdout == "aboard\n"
 
 
 def test_an_error_of_a_message_does_not_end_the_stream(doors):

@@ -11,7 +11,6 @@ import pytest
 from docs_site.links import rewrite
 from docs_site.tables import table
 
-from shipshape.cli import build_parser
 from shipshape.settings import PREFIX, Settings
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -92,9 +91,8 @@ def test_the_metrics_are_in_the_reference(site):
 
 def test_every_command_is_in_the_reference(site):
     text = Loaded(site / "reference/commands.html").text
-    for command in ("serve", "classify", "check", "bundle verify", "loadtest", "token", "admin swap"):
+    for command in ("serve", "classify", "batch", "check", "bundle verify", "loadtest", "token", "admin swap"):
         assert f"usage: shipshape {command}" in text
-    assert build_parser().prog == "shipshape"
 
 
 def test_every_message_field_and_path_is_in_the_reference(site):

@@ -89,6 +89,7 @@ def test_the_plan_is_what_the_arguments_ask_for():
     single, scans = plan_of("--rate", "100"), plan_of("--rate", "100", "--contacts", "5")
     assert len(single.due) == pytest.approx(6300, rel=0.05)
     assert scans.contacts.sum() == pytest.approx(6300, rel=0.1)
+    assert plan_of("--warmup", "0s").due[0] >= 0
     assert single.deadline_s == 0.05
     assert plan_of("--budget", "p90=20ms").deadline_s == 0.02
     assert plan_of("--deadline", "3s").deadline_s == 3.0
@@ -102,6 +103,10 @@ def test_the_plan_is_what_the_arguments_ask_for():
         (["--budget", "50ms"], "a budget like p99=50ms"),
         (["--rate", "0"], "--rate above 0"),
         (["--rate", "nan"], "--rate above 0"),
+        (["--rate", "1e12"], "--rate above 0 and up to 1000000"),
+        (["--seed", "-1"], "--seed of 0 or more"),
+        (["--cert", "own.pem"], "both --cert and --key"),
+        (["--key", "own.key"], "both --cert and --key"),
         (["--contacts", "0"], "for --contacts"),
         (["--processes", "-1"], "for --processes"),
         (["--points", "50,x"], "for --points"),

@@ -16,6 +16,7 @@ from shipshape.loadtest.outcomes import Outcome
 from shipshape.loadtest.precise import precise_loop
 from shipshape.loadtest.targets import target_at
 from shipshape.loadtest.targets.address import Keys, parse_address
+from shipshape.loadtest.targets.channels import of_error
 from shipshape.loadtest.targets.grpc import GrpcTarget
 from shipshape.loadtest.targets.rest import RestTarget
 from shipshape.loadtest.targets.target import TargetError
@@ -154,6 +155,11 @@ ANSWERS = {
     "expired": (504, b"gateway", Outcome.EXPIRED),
     "failed": (500, b"[]", Outcome.ERROR),
     "nonsense": (200, b"{", Outcome.ERROR),
+    "errors without their details": (
+        200,
+        b'{"outputs":[{"name":"error","data":["internal"]},{"name":"detail","data":[]}]}',
+        Outcome.ERROR,
+    ),
     "another protocol": (200, b'{"outputs":[{}]}', Outcome.ERROR),
 }
 
@@ -254,6 +260,11 @@ def test_keys_that_cannot_be_read_are_refused(tmp_path):
     for url in ("grpcs://127.0.0.1:1", "https://127.0.0.1:1"):
         with pytest.raises(FileError, match="PEM"):
             run(target_at(address(url, ca=tmp_path / "none.pem")).open())
+
+
+def test_an_error_that_only_a_newer_service_knows_counts_as_one():
+    reply = of_error(pb.ContactError(kind=99, message="expected tides, got none"))
+    assert (reply.outcome, reply.detail) == (Outcome.ERROR, "error 99: expected tides, got none")
 
 
 def test_a_stream_that_breaks_is_opened_again():

@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import socket
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import httpx
@@ -218,6 +220,28 @@ def test_the_command_line_without_a_door_or_a_token(tmp_path, capsys):
     assert main(["admin", "status", "--token-file", str(tmp_path / "nowhere")]) == 2
     assert "expected to read a token from" in capsys.readouterr().err
     assert main(["admin", "status", "--url", "file:x", "--token-file", str(tmp_path / "admin.token")]) == 2
+
+
+@pytest.mark.parametrize("said", [b"\0\0\x12\4\0\n", b"HTTP/1.1 200 OK\r\nContent-Length: 6\r\n\r\n<html>"])
+def test_the_command_line_at_another_kind_of_door(said, tmp_path, capsys):
+    with socket.create_server(("127.0.0.1", 0)) as door, ThreadPoolExecutor(1) as pool:
+        pool.submit(say, door, said)
+
+        class Another:
+            base_url = f"http://127.0.0.1:{door.getsockname()[1]}"
+
+        assert call(Another, tmp_path, "status") == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"shipshape: expected an admin door at {Another.base_url}, got ")
+    assert error.endswith(": is --url the address of the service's SHIPSHAPE_ADMIN_PORT?\n")
+
+
+def say(door, what):
+    """Answer one caller."""
+    caller, _ = door.accept()
+    with caller:
+        caller.recv(4096)
+        caller.sendall(what)
 
 
 def test_two_swaps_at_a_time_are_a_conflict(both):

@@ -16,7 +16,7 @@ from shipshape.batch.progress import progress_of
 from shipshape.batch.report import Report, print_report, report_of, to_json
 from shipshape.batch.results import Results, open_results, write_whole
 from shipshape.batch.units import Ending, Part, Source
-from shipshape.errors import FileError
+from shipshape.errors import FileError, SettingsError
 
 OK, REFUSED = 0, 1
 
@@ -33,6 +33,8 @@ def batch(arguments: argparse.Namespace) -> int:
         raise FileError("expected files of points or recordings in INPUT, got folders without any")
     if arguments.compare is not None and not (arguments.compare / "contacts.parquet").is_file():
         raise FileError(f"expected results of a finished run in {arguments.compare}, got no contacts.parquet")
+    if arguments.compare is not None and arguments.compare.resolve() == arguments.out.resolve():
+        raise SettingsError(f"expected another folder in --compare than in --out, got {arguments.out} in both")
     engine = engine_of(arguments, method)  # first: workers fork here, and must inherit neither threads nor locks
     identity = identity_of(method, engine.bundle, engine.code)
     with open_results(arguments.out, identity, clouds=method.restored) as results:

@@ -50,6 +50,10 @@ class Inputs:
         for path, record in zip(self._paths, self.records, strict=True):
             if record.error:
                 continue
+            # First: of two names for one content, it may be the wrong one.
+            if not (path.is_dir() or _is_known(path)):
+                record.error = f"expected a file ending in {' '.join([*FILES, *RECORDINGS])}, got {path.name}"
+                continue
             try:
                 record.sha256 = _digest(path)
             except OSError as error:
@@ -69,13 +73,16 @@ class Inputs:
 def find_inputs(given: Sequence[Path], out: Path) -> list[Path]:
     """Files as they are given, and in folders all of known kinds, sorted; a folder of a ROS 2 bag is one input.
 
+    A folder is searched once, however many links lead to it.
+
     Args:
         given: Files and folders.
         out: The folder of results, which is no input.
     """
     found: list[Path] = []
+    searched = {out.resolve()}
     for path in given:
-        found.extend(_within(path, out.resolve()) if path.is_dir() and not is_recording(path) else [path])
+        found.extend(_within(path, searched) if path.is_dir() and not is_recording(path) else [path])
     return list(dict.fromkeys(found))
 
 
@@ -84,7 +91,10 @@ def shown(path: Path) -> str:
     return os.fsencode(str(path)).decode("utf-8", "replace")
 
 
-def _within(folder: Path, out: Path) -> Iterator[Path]:
+def _within(folder: Path, searched: set[Path]) -> Iterator[Path]:
+    if (place := folder.resolve()) in searched:
+        return
+    searched.add(place)
     try:
         entries = sorted(folder.iterdir())
     except OSError:  # it becomes an input, so that its refusal is told with all others
@@ -92,10 +102,13 @@ def _within(folder: Path, out: Path) -> Iterator[Path]:
         return
     for entry in entries:
         if entry.is_dir() and not is_recording(entry):
-            if entry.resolve() != out:
-                yield from _within(entry, out)
-        elif entry.is_dir() or entry.suffix.lower() in {*FILES, *RECORDINGS}:
+            yield from _within(entry, searched)
+        elif entry.is_dir() or _is_known(entry):
             yield entry
+
+
+def _is_known(path: Path) -> bool:
+    return path.suffix.lower() in {*FILES, *RECORDINGS}
 
 
 def _files(path: Path) -> list[Path]:
@@ -103,6 +116,8 @@ def _files(path: Path) -> list[Path]:
 
 
 def _size(path: Path) -> int:
+    if path.exists() and not (path.is_file() or path.is_dir()):  # a pipe would be waited for, a device never ends
+        raise OSError("something that is neither file nor folder")
     return sum(file.stat().st_size for file in _files(path))
 
 

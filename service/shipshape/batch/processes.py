@@ -21,6 +21,7 @@ from shipshape.errors import ShipshapeError
 
 Work = Callable[[Chunk], Part]
 AHEAD = 3  # chunks of each worker that are read before their turn; bounds memory
+POINTS_AHEAD = 2**25  # of all these chunks together, 0.4 GB; one cloud may have as many
 PR_SET_PDEATHSIG = 1  # of linux/prctl.h
 
 _work: Work  # of a worker process
@@ -57,14 +58,21 @@ def run_ahead(
     executor: Executor, work: Work, chunks: Iterable[Chunk | Ending], ahead: int
 ) -> Iterator[Part | Ending]:
     """As `run_in_processes`, by any executor, at most `ahead` chunks before the part that is awaited."""
-    waiting: deque[Future[Part] | Ending] = deque()
+    waiting: deque[tuple[Future[Part] | Ending, int]] = deque()  # and the points of each
+    held = 0
     try:
         for item in chunks:
-            waiting.append(item if isinstance(item, Ending) else executor.submit(work, item))
-            while len(waiting) > ahead or (waiting and _is_ready(waiting[0])):
-                yield _take(waiting.popleft())
-        while waiting:
-            yield _take(waiting.popleft())
+            if isinstance(item, Ending):
+                waiting.append((item, 0))
+            else:
+                waiting.append((executor.submit(work, item), item.points))
+                held += item.points
+            while len(waiting) > ahead or held > POINTS_AHEAD or (waiting and _is_ready(waiting[0][0])):
+                taken, points = waiting.popleft()
+                held -= points
+                yield _take(taken)
+        for taken, _ in waiting:
+            yield _take(taken)
     except BrokenProcessPool as error:
         raise ShipshapeError(
             "expected every worker to live, but one died, for want of memory perhaps: run the same command again, "

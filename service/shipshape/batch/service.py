@@ -28,6 +28,8 @@ from shipshape.v1.shipshape_pb2_grpc import ShipshapeStub
 CONTACTS = 32  # of a message: few enough to leave room for the lanes before
 TIMEOUT_S, PATIENCE_S, PAUSE_S = 60.0, 600.0, 0.2
 PUSHBACK = "grpc-retry-pushback-ms"
+POINT_BYTES = 12
+ADVICE = "split a scan into clusters first"
 BUSY = (pb.ERROR_KIND_OVERLOADED, pb.ERROR_KIND_DEADLINE_EXCEEDED, pb.ERROR_KIND_NOT_READY)
 BUSY_CODES = (
     grpc.StatusCode.RESOURCE_EXHAUSTED,
@@ -68,6 +70,7 @@ class Service:
         self.bundle: str = info.bundle
         self._contacts = min(CONTACTS, info.limits.max_contacts)
         self._bytes: int = info.limits.max_body_bytes // 2
+        self._points: int = info.limits.max_points
 
     def answers_of(self, options: Options, *, restored: bool) -> AnswerAll:
         """Its answers, always in full and by the bundle that it had at first."""
@@ -102,7 +105,12 @@ class Service:
 
     def _ask(self, group: list[pb.Contact], wishes: pb.Options) -> list[Answer]:
         """The answers to a group; what the service is too busy for is asked again."""
-        answers: dict[int, Answer] = {}
+        # What is over the limit of a message is not sent: it would be refused with all others in it.
+        answers: dict[int, Answer] = {
+            index: f"expected at most {self._points} points in a cluster, got {points}: {ADVICE}"
+            for index, message in enumerate(group)
+            if (points := len(message.points) // POINT_BYTES) > self._points
+        }
         until = time.monotonic() + PATIENCE_S
         while len(answers) < len(group):
             open_ = [index for index in range(len(group)) if index not in answers]

@@ -51,6 +51,11 @@ class Chunk:
         """Of its part."""
         return part_name(self.sha256, self.number)
 
+    @property
+    def points(self) -> int:
+        """Of all its clouds."""
+        return sum(len(cloud.points_level) for cloud in self.clouds)
+
 
 @dataclass(frozen=True, slots=True)
 class Part:

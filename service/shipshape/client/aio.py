@@ -15,11 +15,11 @@ from shipshape.client.attempts import Attempts
 from shipshape.client.calls import Calls
 from shipshape.client.endpoint import Endpoint, as_endpoint
 from shipshape.client.failures import RETRYABLE
-from shipshape.client.local import Local
+from shipshape.client.local import Local, within
 from shipshape.client.route import Route
 from shipshape.client.streaming import Scans, Streaming
 from shipshape.client.wishes import Wishes
-from shipshape.errors import DeadlineExceeded, SettingsError, ShipshapeError
+from shipshape.errors import DeadlineExceeded, FileError, SettingsError, ShipshapeError
 from shipshape.executor import Lane
 from shipshape.types import Contact
 
@@ -72,9 +72,13 @@ class AsyncClient:
             folder = self._wants_local if isinstance(self._wants_local, Path) else None
             self._local = await asyncio.to_thread(Local, folder)
         dice = random.Random()
-        for endpoint in self._endpoints:
-            route = Route(endpoint.url, endpoint.link, dice)
-            self._calls[route] = Calls(endpoint, route)
+        try:
+            for endpoint in self._endpoints:
+                route = Route(endpoint.url, endpoint.link, dice)
+                self._calls[route] = Calls(endpoint, route)
+        except FileError:
+            await self.__aexit__(None, None, None)
+            raise
         if len(self._calls) > 1:
             self._watching = [asyncio.create_task(self._watch(calls)) for calls in self._calls.values()]
         return self
@@ -133,7 +137,13 @@ class AsyncClient:
             wishes: Hold for all of them.
             timeout_s: Of each scan.
             window: Scans that may be under way.
+
+        Raises:
+            SettingsError: A window of none.
+            ShipshapeError: What no other call would mend, and what `scans` raises.
         """
+        if window < 1:
+            raise SettingsError(f"expected a window of 1 scan or more, got {window}")
         streaming = Streaming(
             [*self._opened().values()], self._local, wishes or Wishes(), self._limit(timeout_s), window
         )
@@ -185,6 +195,7 @@ class AsyncClient:
         contacts: int,
     ) -> T:
         opened, left_s, local = self._opened(), self._limit(timeout_s), self._local
+        deadline = time.monotonic() + left_s
         if local is None:
             return await Attempts(
                 [*opened], lambda route, s: send(opened[route], s), left_s, hedge=self._hedge
@@ -197,7 +208,7 @@ class AsyncClient:
             )
             with contextlib.suppress(*RETRYABLE, DeadlineExceeded):
                 return await attempts.run()
-        return await compute(local)
+        return await within(deadline, compute(local))
 
     async def _watch(self, calls: Calls) -> None:
         while True:

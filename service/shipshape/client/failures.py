@@ -63,7 +63,8 @@ def error_of(call: grpc.aio.AioRpcError, where: str) -> ShipshapeError:
 
 def error_of_contact(error: pb.ContactError) -> ShipshapeError:
     """The error of one contact of a scan, or of one message of a stream."""
-    name = pb.ErrorKind.Name(error.kind).removeprefix("ERROR_KIND_").lower()
+    known = error.kind in pb.ErrorKind.values()  # a newer service may have others
+    name = pb.ErrorKind.Name(error.kind).removeprefix("ERROR_KIND_").lower() if known else ""
     return KINDS.get(name, ServiceFault)(error.message)
 
 

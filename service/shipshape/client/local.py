@@ -5,8 +5,9 @@ Nothing of it is imported before a client is opened that asks for it.
 
 import asyncio
 import time
+from collections.abc import Awaitable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,9 +16,7 @@ from shipshape.client.wishes import Wishes
 from shipshape.errors import DeadlineExceeded, InvalidInput, ShipshapeError
 from shipshape.types import Contact, Options, Recognition
 
-if TYPE_CHECKING:
-    pass
-
+T = TypeVar("T")
 SLOWER = 2.0  # times its last answer: what is kept of a deadline for one more
 
 
@@ -72,6 +71,19 @@ class Local:
         self.reserve_s = SLOWER * (time.monotonic() - started)
         _check_age(wishes)
         return _answer(contact, found, wishes)
+
+
+async def within(deadline: float, answer: Awaitable[T]) -> T:
+    """The answer, if it is there by the deadline on the monotonic clock.
+
+    Raises:
+        DeadlineExceeded: It is not. What was begun of it ends by itself; its remaining contacts are left.
+    """
+    try:
+        async with asyncio.timeout(deadline - time.monotonic()):
+            return await answer
+    except TimeoutError:
+        raise DeadlineExceeded("expected an answer of this process in time, got none") from None
 
 
 def _check_age(wishes: Wishes) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from shipshape.client.answers import Answer, Capacity, Refusal
 from shipshape.client.failures import error_of_contact
 from shipshape.client.wishes import Wishes
+from shipshape.errors import InvalidInput
 from shipshape.quantised import quantise
 from shipshape.types import (
     Box,
@@ -26,13 +27,18 @@ def from_contact(contact: Contact, step_m: float | None = None) -> pb.Contact:
     """The message of a contact, its points in float32, or in int16 steps of `step_m` metres.
 
     Points that no steps can tell go as they are, for the service to refuse.
+
+    Raises:
+        InvalidInput: Points of another shape, which the bytes of a message could not tell.
     """
+    points = np.asarray(contact.points_level, np.float32)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InvalidInput(f"expected points of shape (n, 3), got {points.shape}")
     message = pb.Contact(
         contact_id=contact.contact_id,
         sensor_height_m=contact.sensor_height,
         own_true_heading_deg=contact.own_true_heading_deg,
     )
-    points = np.asarray(contact.points_level, np.float32)
     if step_m is not None and len(points) and np.isfinite(points).all():
         quantised = quantise(points, step_m)
         x, y, z = quantised.origin_level

@@ -11,11 +11,11 @@ from grpc import aio
 from shipshape.client.answers import ScanAnswer
 from shipshape.client.calls import Calls
 from shipshape.client.failures import RETRYABLE, Silent, error_of, error_of_contact
-from shipshape.client.local import Local
+from shipshape.client.local import Local, within
 from shipshape.client.messages import from_wishes, to_results
 from shipshape.client.route import choose
 from shipshape.client.wishes import Wishes
-from shipshape.errors import DeadlineExceeded, ShipshapeError, Unreachable
+from shipshape.errors import DeadlineExceeded, InvalidInput, ShipshapeError, Unreachable
 from shipshape.types import Contact
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -55,6 +55,7 @@ class Streaming:
         self._fresh: asyncio.Queue[_Scan | None] = asyncio.Queue()  # None: there are no more
         self._ended = False
         self._waiting: dict[int, _Scan] = {}  # taken and not answered, by sequence
+        self._wrong: dict[int, ScanAnswer] = {}  # of these, what no message can tell
 
     async def answers(self, scans: Scans) -> AsyncIterator[ScanAnswer]:
         """The answer to each scan, in the order in which they end; raises what `scans` raises, after the last."""
@@ -108,8 +109,8 @@ class Streaming:
         try:
             while True:
                 await asyncio.wait({reading}, timeout=LOOK_S)
-                if writing.done():
-                    writing.result()  # raises what a contact was wrong with
+                for unwritten in self._unwritten(writing):
+                    yield unwritten
                 if late := self._late(GRACE_S):
                     calls.route.told_silence(time.monotonic(), _silence(calls.endpoint.url), self._timeout_s)
                     for scan in late:
@@ -118,6 +119,7 @@ class Streaming:
                 if not reading.done():
                     continue
                 if (response := reading.result()) is aio.EOF:  # type: ignore[attr-defined]  # the stubs forget it
+                    self._note_the_end(calls)
                     return
                 reading = asyncio.ensure_future(call.read())
                 if (answered := self._waiting.get(response.sequence)) is not None:
@@ -130,6 +132,12 @@ class Streaming:
                 task.cancel()
             call.cancel()
             await asyncio.gather(writing, reading, return_exceptions=True)
+
+    def _note_the_end(self, calls: Calls) -> None:
+        """A service that ends the call while scans wait for it is left alone for a while, as one that broke it."""
+        if not self._ended or self._waiting.keys() - self._wrong.keys():
+            why = Unreachable(f"expected a stream of {calls.endpoint.url} that holds, got one that ended")
+            calls.route.told_failure(time.monotonic(), why)
 
     async def _explain(self, error: aio.AioRpcError, calls: Calls) -> ShipshapeError:
         """What ended a call; raised unless another call may go on."""
@@ -148,13 +156,28 @@ class Streaming:
     async def _write(self, call: Any, calls: Calls) -> None:
         try:
             for scan in [*self._waiting.values()]:  # those that a call before this one did not answer
-                await call.write(self._message(scan, calls))
+                await self._write_one(call, calls, scan)
             while not self._ended:
                 if (fresh := await self._take(None)) is not None:
-                    await call.write(self._message(fresh, calls))
+                    await self._write_one(call, calls, fresh)
             await call.done_writing()
         except (aio.AioRpcError, asyncio.InvalidStateError):
             return  # the call broke, and whoever reads from it is told why
+
+    async def _write_one(self, call: Any, calls: Calls, scan: _Scan) -> None:
+        try:
+            message = self._message(scan, calls)
+        except InvalidInput as error:
+            self._wrong[scan.sequence] = ScanAnswer(scan.sequence, (), error)
+        else:
+            await call.write(message)
+
+    def _unwritten(self, writing: asyncio.Future[None]) -> list[ScanAnswer]:
+        """The answers to scans that no message can tell; raises what else kept them from being written."""
+        if writing.done():
+            writing.result()
+        sequences = self._wrong.keys() & self._waiting.keys()
+        return [self._finish(self._waiting[each], self._wrong.pop(each)) for each in sequences]
 
     def _message(self, scan: _Scan, calls: Calls) -> pb.RecogniseStreamRequest:
         left_s = scan.deadline - time.monotonic() - (calls.route.round_trip_s or 0.0)
@@ -177,7 +200,11 @@ class Streaming:
     async def _without_service(self, scan: _Scan) -> ScanAnswer:
         if self._local is None:
             return _late(scan, ", ".join(route.url for route in self._calls))
-        return ScanAnswer(scan.sequence, await self._local.scan(scan.contacts, self._wishes))
+        try:
+            results = await within(scan.deadline, self._local.scan(scan.contacts, self._wishes))
+        except DeadlineExceeded as error:
+            return ScanAnswer(scan.sequence, (), error)
+        return ScanAnswer(scan.sequence, results)
 
 
 def _late(scan: _Scan, where: str) -> ScanAnswer:

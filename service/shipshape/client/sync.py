@@ -1,8 +1,10 @@
 """The client, for programs without an event loop; threads may share one."""
 
 import asyncio
+import os
 import threading
-from collections.abc import AsyncIterator, Coroutine, Iterable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -87,14 +89,15 @@ class Client:
 
 _starting = threading.Lock()
 _loop: asyncio.AbstractEventLoop | None = None
+_process = 0  # whose loop it is
 
 
 def _background() -> asyncio.AbstractEventLoop:
     """The event loop of all clients of this process: gRPC is at its best with one."""
-    global _loop  # noqa: PLW0603  one a process is the point
+    global _loop, _process
     with _starting:
-        if _loop is None:
-            _loop = asyncio.new_event_loop()
+        if _loop is None or _process != os.getpid():  # its thread did not come along when this process was forked
+            _loop, _process = asyncio.new_event_loop(), os.getpid()
             threading.Thread(target=_loop.run_forever, name="shipshape-client", daemon=True).start()
         return _loop
 
@@ -119,5 +122,21 @@ async def _close(answers: AsyncIterator[ScanAnswer]) -> None:
 
 async def _threaded(scans: Iterable[Sequence[Contact]]) -> AsyncIterator[Sequence[Contact]]:
     iterator = iter(scans)
-    while (scan := await asyncio.to_thread(next, iterator, _END)) is not _END:
+    while (scan := await _aside(lambda: next(iterator, _END))) is not _END:
         yield scan
+
+
+async def _aside(work: Callable[[], T]) -> T:
+    """What `work` returns, done in a thread that keeps no program from ending, however long it blocks."""
+    future: Future[T] = Future()
+    future.set_running_or_notify_cancel()
+
+    def run() -> None:
+        """Until `work` ends, though nobody may wait for it any more."""
+        try:
+            future.set_result(work())
+        except BaseException as error:
+            future.set_exception(error)
+
+    threading.Thread(target=run, name="shipshape-scans", daemon=True).start()
+    return await asyncio.wrap_future(future)

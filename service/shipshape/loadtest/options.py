@@ -1,7 +1,6 @@
 """The command line's arguments -> what to send, to whom, and what is asked of it."""
 
 import argparse
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from shipshape.pointfiles import read_clusters
 from shipshape.sample import sample_contact
 from shipshape.token_file import read_token
 
+MOST_RATE = 1e6  # contacts a second, whose schedule still fits into memory
 DEFAULT_RATE = 100.0  # contacts a second, where neither --rate nor a recording says one
 
 Draw = Callable[[float, float, np.random.Generator], Times]  # requests a second, seconds, rng
@@ -79,8 +79,12 @@ def options_of(arguments: argparse.Namespace) -> LoadTest:
     token = "" if arguments.token_file is None else read_token(arguments.token_file)
     keys = Keys(arguments.ca, arguments.cert, arguments.key, token)
     deadline_s = budget.limit_s if arguments.deadline is None else seconds_of(arguments.deadline)
-    if arguments.rate is not None and not 0 < arguments.rate < math.inf:
-        raise SettingsError(f"expected --rate above 0, got {arguments.rate}")
+    if arguments.rate is not None and not 0 < arguments.rate <= MOST_RATE:
+        raise SettingsError(f"expected --rate above 0 and up to {MOST_RATE:.0f}, got {arguments.rate}")
+    if arguments.seed < 0:
+        raise SettingsError(f"expected --seed of 0 or more, got {arguments.seed}")
+    if (arguments.cert is None) != (arguments.key is None):
+        raise SettingsError("expected both --cert and --key, got one of them")
     for name in ("contacts", "connections", "processes", "max_outstanding"):
         _positive(str(getattr(arguments, name)), f"--{name.replace('_', '-')}")
     schedule, mean_contacts = _schedule(arguments.arrivals, arguments.contacts)
@@ -91,7 +95,10 @@ def options_of(arguments: argparse.Namespace) -> LoadTest:
         mean_contacts=mean_contacts,
         mixture=_mixture(arguments),
         terms=Terms(
-            seconds_of(arguments.duration), seconds_of(arguments.warmup), deadline_s, arguments.max_outstanding
+            seconds_of(arguments.duration),
+            seconds_of(arguments.warmup, none=True),
+            deadline_s,
+            arguments.max_outstanding,
         ),
         seed=arguments.seed,
     )

@@ -8,10 +8,10 @@ from shipshape.errors import SettingsError
 UNITS_S = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "m": 60.0, "h": 3600.0, "": 1.0}
 
 
-def seconds_of(text: str) -> float:
-    """The seconds in 50ms, 2s, 1m or 2; raises SettingsError for anything but a time above 0."""
+def seconds_of(text: str, *, none: bool = False) -> float:
+    """The seconds in 50ms, 2s, 1m or 2; raises SettingsError for anything else, and for 0 unless `none` may be."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)(us|ms|s|m|h|)", text)
-    if match is None or float(match[1]) == 0:
+    if match is None or (float(match[1]) == 0 and not none):
         raise SettingsError(f"expected a time like 50ms, 2s or 1m, got {text!r:.80}")
     return float(match[1]) * UNITS_S[match[2]]
 

@@ -11,6 +11,8 @@ from shipshape.errors import FileError
 from shipshape.pointfiles.clusters import MAX_CLUSTERS, Cluster, id_name, id_text, split_by_id
 from shipshape.pointfiles.columns import AXES, as_points, cause, listed
 
+VALUE_BYTES = 4  # of a coordinate, as a reader's points hold it
+
 
 def read_parquet(path: Path, max_bytes: int, id_names: Collection[str]) -> list[Cluster]:
     """The clusters in the columns x, y and z: lists are a cluster a row; of numbers, each id is a cluster."""
@@ -35,10 +37,16 @@ def _read(file: pq.ParquetFile, named: str | None, max_bytes: int, what: str) ->
     if not set(AXES) <= set(names):
         raise FileError(f"expected the columns x, y, z in {what}, got {listed(names)}")
     groups = [file.metadata.row_group(index) for index in range(file.metadata.num_row_groups)]
-    needed = sum(group.total_byte_size for group in groups)
+    # What is all alike takes next to nothing in the file, however many values it is.
+    needed = max(sum(group.total_byte_size for group in groups), VALUE_BYTES * sum(map(_values, groups)))
     if needed > max_bytes:
         raise FileError(f"expected {what} to unpack to at most {max_bytes} bytes, got {needed}")
     return file.read([*AXES, *([named] if named else [])])
+
+
+def _values(group: pq.RowGroupMetaData) -> int:
+    columns = (group.column(index) for index in range(group.num_columns))
+    return sum(column.num_values for column in columns if column.path_in_schema.split(".")[0] in AXES)
 
 
 def _a_row_a_cluster(columns: list[pa.Array], ids: list[object] | None, what: str) -> list[Cluster]:

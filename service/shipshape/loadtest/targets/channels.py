@@ -82,7 +82,8 @@ def of_contact(result: pb.ContactResult) -> Reply:
 
 def of_error(error: pb.ContactError) -> Reply:
     """How a contact counts that got no answer."""
-    kind = pb.ErrorKind.Name(error.kind)
+    known = error.kind in pb.ErrorKind.values()  # a newer service may have others
+    kind = pb.ErrorKind.Name(error.kind) if known else f"error {error.kind}"
     return Reply(CONTACT_OUTCOMES.get(error.kind, Outcome.ERROR), f"{kind}: {error.message}")
 
 

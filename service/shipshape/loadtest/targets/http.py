@@ -63,7 +63,7 @@ class HttpClient:
             return Reply(OUTCOMES.get(response.status, Outcome.ERROR), f"{response.status}: {_words(answer)}")
         try:
             return read(orjson.loads(answer))
-        except (orjson.JSONDecodeError, LookupError, TypeError, AttributeError) as error:
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
             came = f"{type(error).__name__}: {error}"
             return Reply(Outcome.ERROR, f"expected an answer of the protocol, got another: {came}")
 
