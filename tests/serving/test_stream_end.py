@@ -20,6 +20,7 @@ from serving.stream_calls import (
     no_sender_waits_for_ever,
     readers,
 )
+from shipshape.serving.grpc import server
 from shipshape.serving.grpc.streams import STREAMS
 from shipshape.v1 import shipshape_pb2 as pb
 
@@ -62,6 +63,22 @@ def test_a_client_that_is_killed_leaves_nothing_behind():
         doors.pipeline.release.set()
         until(lambda: idle(doors) and not readers())
         assert doors.ask_grpc(POINTS)[0].recognition.vessel == "tug"
+
+
+def test_a_client_that_falls_silent_gives_its_place_back(monkeypatch):
+    monkeypatch.setattr(server, "KEEPALIVE_MS", 100)
+    monkeypatch.setattr(server, "KEEPALIVE_TIMEOUT_MS", 100)
+    with running() as doors:
+        address = f"127.0.0.1:{doors.addresses.grpc_port}"
+        with subprocess.Popen([sys.executable, "-c", KILLED, address, PACKED.hex()]) as client:
+            try:
+                until(lambda: doors.service.executor.queue_depth == 255)
+                client.send_signal(signal.SIGSTOP)  # its connection stays, and nobody answers behind it
+                until(lambda: not doors.service.executor.queue_depth)
+                doors.pipeline.release.set()
+                until(lambda: idle(doors) and not readers())
+            finally:
+                client.kill()
 
 
 @pytest.mark.parametrize(
