@@ -73,7 +73,9 @@ def joined(contact_ids: Sequence[str], outcomes: Sequence[Reply[bytes] | Fault])
 
 def _result(contact_id: str, outcome: Reply[bytes] | Fault) -> bytes:
     if isinstance(outcome, Fault):
-        error = {"error": outcome.kind, "detail": outcome.message}
+        error: Json = {"error": outcome.kind, "detail": outcome.message}
+        if outcome.retry_after_ms is not None:
+            error["retry_after_ms"] = outcome.retry_after_ms
         return to_bytes({"contact_id": contact_id, "error": error})
     return b'{"contact_id":%s,"recognition":%s}' % (orjson.dumps(contact_id), outcome.content)
 
