@@ -3,9 +3,14 @@
 #   docker build --tag shipshape .
 #   docker run --rm --read-only --tmpfs /tmp --stop-timeout 15 -p 127.0.0.1:8080:8080 -p 127.0.0.1:50051:50051 shipshape
 #
-# All Python packages are pinned by hash. Pin the base too, by the digest that your registry shows for the tag:
-#   docker build --build-arg BASE=python:3.11-slim-bookworm@sha256:... --tag shipshape .
+# All packages are pinned by hash. Pin the bases too, by the digests that your registry shows for the tags:
+#   docker build --build-arg BASE=python:3.11-slim-bookworm@sha256:... --build-arg NODE=... --tag shipshape .
 ARG BASE=python:3.11-slim-bookworm
+ARG NODE=node:22-bookworm-slim
+
+FROM ${NODE} AS console
+COPY console /src/console
+RUN mkdir -p /src/service/shipshape/console && sh /src/console/build.sh
 
 FROM ${BASE} AS build
 WORKDIR /src
@@ -15,6 +20,7 @@ COPY requirements/service.lock requirements/
 RUN /opt/shipshape/bin/pip install --require-hashes --requirement requirements/service.lock
 COPY pyproject.toml README.md ./
 COPY service service
+COPY --from=console /src/service/shipshape/console/static service/shipshape/console/static
 # What only building needs does not travel on.
 RUN /opt/shipshape/bin/pip install --no-build-isolation --no-deps --no-index . \
  && /opt/shipshape/bin/pip uninstall --yes editables hatchling pathspec pluggy trove-classifiers setuptools pip

@@ -63,7 +63,15 @@ print("  ", answer["vessel"], answer["probability"], response.headers["Server-Ti
 assert not answer["unknown"]
 END
 
-echo "6. SIGTERM: drained, exit code 0"
+echo "6. the console"
+inside python - <<'END' || fail "expected the console at /"
+import urllib.request
+
+with urllib.request.build_opener(urllib.request.ProxyHandler({})).open("http://127.0.0.1:8080/") as page:
+    assert b"<title>" in page.read()
+END
+
+echo "7. SIGTERM: drained, exit code 0"
 $engine stop --time 20 "$name" >/dev/null
 code=$($engine inspect --format '{{.State.ExitCode}}' "$name")
 [ "$code" = 0 ] || fail "expected exit code 0, got $code"

@@ -1,5 +1,6 @@
 """A message of a stream meets the fate of the same scan: the same bytes, or the same error in the same words."""
 
+import json
 import re
 from contextlib import suppress
 
@@ -8,8 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from serving.fakes import PATIENCE, cluster
-from shipshape.serving.faults import FaultKind
+from serving.fakes import PATIENCE, cluster, running
+from shipshape.client.failures import error_of_contact
+from shipshape.serving.faults import Fault, FaultKind
+from shipshape.serving.grpc import convert
+from shipshape.serving.rest import answers
+from shipshape.serving.rest.schemas import ContactError
 from shipshape.v1 import shipshape_pb2 as pb
 
 PACKED = cluster().tobytes()
@@ -88,6 +93,26 @@ def test_what_is_wrong_with_a_scan_is_wrong_with_a_message(doors, count, options
     message = [pb.Contact(points=PACKED)] * count, options
     assert streamed(doors, [message]) == [scanned(doors, *message)]
     assert streamed(doors, [message])[0][0] == kind
+
+
+def test_a_message_that_is_refused_says_when_to_come_back_as_its_scan_does():
+    with running(max_contacts=1, client_contacts_per_s=0.01, client_burst=1) as doors:
+        message = pb.RecogniseStreamRequest(contacts=[pb.Contact(points=PACKED)])
+        first, second = doors.stub.RecogniseStream(iter([message] * 2), timeout=PATIENCE)
+        refused = first if first.HasField("error") else second
+        scan = doors.stub.RecogniseScan.future(pb.RecogniseScanRequest(contacts=message.contacts))
+        assert scan.exception() is not None
+        told = int(dict(scan.trailing_metadata())["grpc-retry-pushback-ms"])
+        assert 0 < told <= refused.error.retry_after_ms <= 100_000
+        assert error_of_contact(refused.error).retry_after_s == refused.error.retry_after_ms / 1e3
+
+
+def test_a_contact_that_is_refused_says_when_to_come_back_in_json_too():
+    fault = Fault(FaultKind.OVERLOADED, "expected room, got none", retry_after_s=0.0121)
+    (result,) = json.loads(answers.joined(["c7"], [fault]))["results"]
+    assert result["error"] == {"error": "overloaded", "detail": "expected room, got none", "retry_after_ms": 13}
+    assert result["error"]["retry_after_ms"] == convert.from_fault(fault).retry_after_ms
+    ContactError.model_validate(result["error"], strict=True)
 
 
 @settings(max_examples=50)

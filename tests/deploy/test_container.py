@@ -60,6 +60,14 @@ def test_what_the_image_copies_is_not_ignored():
     assert all((ROOT / name).exists() for name in kept)
 
 
+def test_the_image_holds_the_console_of_its_own_sources():
+    built, installed = "service/shipshape/console/static", "install --no-build-isolation"
+    copied = f"COPY --from=console /src/{built} {built}\n"
+    assert DOCKERFILE.index("/console/build.sh") < DOCKERFILE.index(copied) < DOCKERFILE.index(installed)
+    assert built in (ROOT / "pyproject.toml").read_text()
+    assert "**/node_modules" in (ROOT / ".dockerignore").read_text()
+
+
 def test_both_stages_compile_for_the_same_processor():
     for setting in ("ARG NUMBA_CPU_NAME=generic", "NUMBA_CPU_NAME=${NUMBA_CPU_NAME}", 'NUMBA_CPU_FEATURES=""'):
         assert DOCKERFILE.count(setting) == 2, setting

@@ -10,6 +10,7 @@ import httpx
 import pytest
 
 from serving.fakes import DIGEST, PATIENCE, FakePipeline, cluster, fake_model, running
+from serving.http_calls import read
 from shipshape.cli import main
 from shipshape.errors import BundleError, InvalidInput, SettingsError
 from shipshape.serving.admin.control import folder_below
@@ -64,6 +65,22 @@ def both(shared):
     yield shared
     admin.post("/admin/resume")
     admin.post("/admin/bundle", json={"folder": "first"})
+
+
+@pytest.mark.parametrize(("token", "status"), [("wrong", 401), (TOKEN, 413)])
+def test_strangers_are_refused_before_their_body_is_read_and_operators_send_little(both, token, status):
+    doors, _ = both
+    address = "127.0.0.1", doors.addresses.admin_port
+    lines = (
+        "Host: x",
+        f"Authorization: Bearer {token}",
+        "Content-Type: application/json",
+        "Content-Length: 99999",
+    )
+    head = "POST /admin/bundle HTTP/1.1\r\n" + "".join(f"{line}\r\n" for line in lines) + "\r\n"
+    with socket.create_connection(address, PATIENCE) as client, client.makefile("rb") as answers:
+        client.sendall(head.encode())
+        assert read(answers)[0] == status
 
 
 @pytest.mark.parametrize("header", [None, "", "Bearer", "Bearer wrong", f"Basic {TOKEN}", TOKEN, "Bearer \u00e4"])

@@ -2,6 +2,9 @@
 
 import json
 import select
+import socket
+import sys
+from contextlib import suppress
 
 import pytest
 
@@ -57,6 +60,44 @@ def test_headers_that_do_not_come_and_connections_that_say_nothing_are_closed(mo
         with connected(doors) as (client, answers):
             client.sendall(HALF)  # its body has until the deadline of the request
             until(lambda: in_flight(doors) == 1)
+
+
+LARGE = b"999999"
+
+
+@pytest.mark.parametrize("rest", [b"x", b"x" * int(LARGE), b"\r\n"], ids=["some", "all", "an empty line"])
+def test_a_client_that_says_more_after_its_answer_and_then_nothing_is_sent_away(monkeypatch, rest):
+    monkeypatch.setattr(protocol, "REST_S", 0.05)
+    monkeypatch.setattr("shipshape.serving.rest.server.KEEP_ALIVE_S", 0.05)
+    with running(max_body_bytes=1024) as doors:
+        begun = LIVE if rest == b"\r\n" else post(f"Content-Length: {LARGE.decode()}")
+        with connected(doors) as (client, answers):
+            client.sendall(begun)
+            assert read(answers)[0] in (200, 413)
+            client.sendall(rest)
+            with suppress(ConnectionResetError):  # some of it was not read
+                assert answers.read() == b""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux watches who reads")
+def test_a_client_that_never_reads_is_sent_away(monkeypatch, caplog):
+    monkeypatch.setattr("shipshape.serving.rest.server.READ_S", 0.1)
+    with running() as doors, connected(doors) as (client, _):
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.settimeout(0.05)
+        until(lambda: _sent_away(client))
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
+def _sent_away(client):
+    """Ask once more, unless all buffers between us are full already."""
+    try:
+        client.sendall(b"GET /openapi.json HTTP/1.1\r\nHost: x\r\n\r\n")
+    except TimeoutError:
+        return False
+    except OSError:
+        return True
+    return False
 
 
 def test_too_many_connections_are_told_so(monkeypatch):

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import grpc
@@ -20,12 +21,22 @@ from serving.stream_calls import (
     no_sender_waits_for_ever,
     readers,
 )
+from shipshape.serving.grpc import server, streams
 from shipshape.serving.grpc.streams import STREAMS
 from shipshape.v1 import shipshape_pb2 as pb
 
 EXHAUSTED, UNAVAILABLE = grpc.StatusCode.RESOURCE_EXHAUSTED, grpc.StatusCode.UNAVAILABLE
 
 __all__ = ["no_sender_waits_for_ever"]
+
+
+class ThreadThatCannotStart(threading.Thread):
+    """Of readers alone: what else starts threads goes on."""
+
+    def start(self):
+        if self.name == "grpc-reader":
+            raise RuntimeError("can't start new thread")
+        super().start()
 
 
 def test_work_of_a_caller_that_left_is_dropped():
@@ -62,6 +73,22 @@ def test_a_client_that_is_killed_leaves_nothing_behind():
         doors.pipeline.release.set()
         until(lambda: idle(doors) and not readers())
         assert doors.ask_grpc(POINTS)[0].recognition.vessel == "tug"
+
+
+def test_a_client_that_falls_silent_gives_its_place_back(monkeypatch):
+    monkeypatch.setattr(server, "KEEPALIVE_MS", 100)
+    monkeypatch.setattr(server, "KEEPALIVE_TIMEOUT_MS", 100)
+    with running() as doors:
+        address = f"127.0.0.1:{doors.addresses.grpc_port}"
+        with subprocess.Popen([sys.executable, "-c", KILLED, address, PACKED.hex()]) as client:
+            try:
+                until(lambda: doors.service.executor.queue_depth == 255)
+                client.send_signal(signal.SIGSTOP)  # its connection stays, and nobody answers behind it
+                until(lambda: not doors.service.executor.queue_depth)
+                doors.pipeline.release.set()
+                until(lambda: idle(doors) and not readers())
+            finally:
+                client.kill()
 
 
 @pytest.mark.parametrize(
@@ -103,6 +130,17 @@ def test_streams_are_bounded_and_leave_the_others_their_threads():
         for call in calls[1:]:
             assert call.close().rest() == ([], OK)
         until(lambda: not readers())
+
+
+def test_streams_without_a_thread_take_no_place(monkeypatch):
+    with running() as doors:
+        monkeypatch.setattr(streams.threading, "Thread", ThreadThatCannotStart)
+        for _ in range(STREAMS + 1):
+            refused = Call(doors)
+            assert refused.rest() == ([], EXHAUSTED)
+            assert refused.responses.details() == "expected a thread for another stream, got none: come back later"
+        monkeypatch.undo()
+        assert Call(doors, message(1, "a")).next().sequence == 1
 
 
 def test_a_stop_answers_what_was_read_then_is_unavailable():

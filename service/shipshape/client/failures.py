@@ -65,7 +65,10 @@ def error_of_contact(error: pb.ContactError) -> ShipshapeError:
     """The error of one contact of a scan, or of one message of a stream."""
     known = error.kind in pb.ErrorKind.values()  # a newer service may have others
     name = pb.ErrorKind.Name(error.kind).removeprefix("ERROR_KIND_").lower() if known else ""
-    return KINDS.get(name, ServiceFault)(error.message)
+    kind = KINDS.get(name, ServiceFault)
+    if kind is Overloaded and error.HasField("retry_after_ms"):
+        return Overloaded(error.message, retry_after_s=error.retry_after_ms / 1e3)
+    return kind(error.message)
 
 
 def value_of(metadata: Any, key: str) -> str | bytes | None:

@@ -4,6 +4,7 @@ Each door has one table from kind to its own status code; this module knows of n
 """
 
 import logging
+import math
 import uuid
 from dataclasses import dataclass
 from enum import StrEnum
@@ -43,6 +44,11 @@ class Fault:
     kind: FaultKind
     message: str
     retry_after_s: float | None = None  # when the caller may come back; only of what is overloaded
+
+    @property
+    def retry_after_ms(self) -> int | None:
+        """The same in whole milliseconds, never too early."""
+        return None if self.retry_after_s is None else math.ceil(self.retry_after_s * 1e3)
 
 
 # The first class that fits; an error that is not listed tells the caller nothing but an id.

@@ -194,12 +194,14 @@ class ContactResult(_message.Message):
     def __init__(self, contact_id: _Optional[str] = ..., recognition: _Optional[_Union[Recognition, _Mapping]] = ..., error: _Optional[_Union[ContactError, _Mapping]] = ...) -> None: ...
 
 class ContactError(_message.Message):
-    __slots__ = ("kind", "message")
+    __slots__ = ("kind", "message", "retry_after_ms")
     KIND_FIELD_NUMBER: _ClassVar[int]
     MESSAGE_FIELD_NUMBER: _ClassVar[int]
+    RETRY_AFTER_MS_FIELD_NUMBER: _ClassVar[int]
     kind: ErrorKind
     message: str
-    def __init__(self, kind: _Optional[_Union[ErrorKind, str]] = ..., message: _Optional[str] = ...) -> None: ...
+    retry_after_ms: int
+    def __init__(self, kind: _Optional[_Union[ErrorKind, str]] = ..., message: _Optional[str] = ..., retry_after_ms: _Optional[int] = ...) -> None: ...
 
 class Recognition(_message.Message):
     __slots__ = ("contact_id", "vessel", "probability", "probabilities", "unknown", "heading", "heading_std", "bow_probability", "aspect_deg", "true_heading_deg", "box", "measured_points", "inferred_points", "keypoints", "rung", "preset", "image_method", "bundle", "stages", "restored", "images", "rendered_png", "reasons", "rung_reason", "descriptors")

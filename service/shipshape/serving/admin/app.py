@@ -3,19 +3,21 @@
 from importlib.metadata import version
 from typing import Annotated, Any
 
-from fastapi import Body, Depends, FastAPI, Request
+from fastapi import Body, FastAPI
+from starlette.types import ASGIApp
 
-from shipshape.errors import Unauthenticated
+from shipshape.serving.access import Access
 from shipshape.serving.admin.control import Control, Json
 from shipshape.serving.admin.problems import add_refusals
+from shipshape.serving.rest.doorkeeper import Doorkeeper
 from shipshape.serving.rest.problems import add_handlers
 from shipshape.serving.tokens import Tokens
 
-SCHEME = "bearer"
+MOST_BYTES = 64 * 2**10  # of a body, which names a folder
 
 
-def build_admin_app(control: Control, tokens: Tokens) -> FastAPI:
-    """The application; every call but the contract itself needs a token.
+def build_admin_app(control: Control, tokens: Tokens) -> ASGIApp:
+    """The application; every path needs a token, of which nothing is read without one.
 
     The handlers are no coroutines, so that a swap of seconds takes a thread and not the event loop.
     """
@@ -24,7 +26,7 @@ def build_admin_app(control: Control, tokens: Tokens) -> FastAPI:
         version=version("shipshape"),
         docs_url=None,
         redoc_url=None,
-        dependencies=[Depends(_with_token(tokens))],
+        max_body_size=MOST_BYTES,
     )
 
     def swap(folder: Annotated[str, Body(embed=True, description="Absolute, or below bundle_root.")]) -> Json:
@@ -42,14 +44,4 @@ def build_admin_app(control: Control, tokens: Tokens) -> FastAPI:
     add("/admin/resume", control.resume, "POST")
     add_handlers(app)
     add_refusals(app)
-    return app
-
-
-def _with_token(tokens: Tokens) -> Any:
-    def check(request: Request) -> None:
-        """Raises Unauthenticated without a token of the file."""
-        scheme, _, token = request.headers.get("authorization", "").partition(" ")
-        if scheme.lower() != SCHEME or tokens.name_of(token.strip()) is None:
-            raise Unauthenticated("expected a token of the admin token file in Authorization: Bearer, got none")
-
-    return check
+    return Doorkeeper(app, Access(tokens=tokens))

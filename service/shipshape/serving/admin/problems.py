@@ -8,13 +8,11 @@ from shipshape.errors import (
     Conflict,
     InvalidInput,
     ShipshapeError,
-    Unauthenticated,
 )
 from shipshape.serving.rest.problems import document, identify
 
 STATUS: dict[type[ShipshapeError], tuple[int, str]] = {
     InvalidInput: (400, "invalid_input"),
-    Unauthenticated: (401, "unauthenticated"),
     Conflict: (409, "conflict"),
     BundleError: (422, "bundle_refused"),
     Cancelled: (503, "not_ready"),  # the service was told to stop
@@ -30,7 +28,4 @@ def add_refusals(app: FastAPI) -> None:
 def _refusal(request: Request, error: Exception) -> Response:
     identify(request.scope)
     status, name = next(STATUS[kind] for kind in type(error).__mro__ if kind in STATUS)
-    answer = document(status, title=name.replace("_", " ").capitalize(), detail=str(error), error=name)
-    if status == 401:
-        answer.headers["WWW-Authenticate"] = "Bearer"
-    return answer
+    return document(status, title=name.replace("_", " ").capitalize(), detail=str(error), error=name)

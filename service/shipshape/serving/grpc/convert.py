@@ -166,7 +166,9 @@ def _result(answer: Answer, wishes: Wishes) -> pb.ContactResult:
 
 def from_fault(fault: Fault) -> pb.ContactError:
     """The message of a fault."""
-    return pb.ContactError(kind=ERROR_KINDS[fault.kind], message=fault.message)
+    return pb.ContactError(
+        kind=ERROR_KINDS[fault.kind], message=fault.message, retry_after_ms=fault.retry_after_ms
+    )
 
 
 def from_stage_ms(stage_ms: Mapping[str, float]) -> list[pb.StageTime]:

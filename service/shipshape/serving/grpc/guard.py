@@ -1,6 +1,5 @@
 """What every RPC of our services passes: limits, parsing, metrics, request id, and the one table of errors."""
 
-import math
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from contextvars import ContextVar
@@ -154,8 +153,8 @@ def set_trailing(context: grpc.ServicerContext, *entries: tuple[str, str | bytes
 def refuse(context: grpc.ServicerContext, fault: Fault, status: grpc.StatusCode | None = None) -> NoReturn:
     """End the call with `status`, or that of `fault`, and tell gRPC's own retries how long to wait."""
     entries = [("shipshape-error", str(fault.kind))]
-    if fault.retry_after_s is not None:
-        entries.append(("grpc-retry-pushback-ms", str(math.ceil(fault.retry_after_s * 1e3))))
+    if fault.retry_after_ms is not None:
+        entries.append(("grpc-retry-pushback-ms", str(fault.retry_after_ms)))
     set_trailing(context, *entries)
     context.abort(status or STATUS[fault.kind], fault.message)
     raise AssertionError("unreachable: abort raises")

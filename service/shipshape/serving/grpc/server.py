@@ -30,6 +30,9 @@ SPARE_THREADS = 4 + PLACES  # for health and the refusals of a full queue, and f
 PING_INTERVAL_MS = (
     20_000  # that clients may ping at when idle; gRPC's own five minutes outlast what modems remember
 )
+# A peer that vanished without a word is asked whether it is there, and given up when it does not say so: so long
+# its stream has a place. A satellite answers within seconds.
+KEEPALIVE_MS, KEEPALIVE_TIMEOUT_MS = 30_000, 20_000
 MESSAGE_SLACK = 4 * 2**20  # bytes over the limit that are still read, so that the refusal is ours, in one sentence
 
 
@@ -70,6 +73,10 @@ class GrpcDoor:
                 ("grpc.max_send_message_length", -1),
                 ("grpc.http2.min_ping_interval_without_data_ms", PING_INTERVAL_MS),
                 ("grpc.keepalive_permit_without_calls", 1),
+                ("grpc.keepalive_time_ms", KEEPALIVE_MS),
+                ("grpc.keepalive_timeout_ms", KEEPALIVE_TIMEOUT_MS),
+                ("grpc.http2.ping_timeout_ms", KEEPALIVE_TIMEOUT_MS),  # of its own pings, which put ours off
+                ("grpc.http2.max_pings_without_data", 0),  # any: a silent stream is what they are for
             ],
         )
         self._streams = Streams(core, metrics, timeouts, access)

@@ -51,9 +51,14 @@ class Streams:
         stream, done = self._enter(client), threading.Event()
         # The call's end wakes the reader; only then, with both its threads free, is the place free.
         reading = copy_context().run  # so that the log knows the request's id
-        threading.Thread(
+        reader = threading.Thread(
             target=reading, args=(self._read, stream, requests, done), name="grpc-reader", daemon=True
-        ).start()
+        )
+        try:
+            reader.start()
+        except RuntimeError as error:  # no thread is left for it, and nobody else would give the place back
+            self._leave(stream)
+            raise Overloaded("expected a thread for another stream, got none: come back later") from error
         try:
             if not context.add_callback(stream.leave):  # it has ended already
                 stream.leave()
@@ -85,8 +90,11 @@ class Streams:
             stream.read(requests)
             done.wait()
         finally:
-            with self._changed:
-                self._open.discard(stream)
+            self._leave(stream)
+
+    def _leave(self, stream: Stream) -> None:
+        with self._changed:
+            self._open.discard(stream)
 
 
 def _stopping() -> NotReady:

@@ -19,7 +19,9 @@ class Joined:
         self._head = b""
 
     def write(self, data: bytes) -> None:
-        """The head of an answer, or some of its body."""
+        """The head of an answer, or some of its body; nothing is written to a client that has left."""
+        if self._transport.is_closing():
+            return
         if not self._head and data.startswith(b"HTTP/1.1 ") and not data.startswith(_CONTINUE):
             self._head = data
         else:

@@ -56,7 +56,7 @@ def retry_headers(fault: Fault) -> dict[str, str]:
     if fault.retry_after_s is None:
         return {}
     whole = max(1, math.ceil(fault.retry_after_s))  # seconds, by its RFC
-    return {"Retry-After": str(whole), RETRY_HEADER: str(math.ceil(fault.retry_after_s * 1e3))}
+    return {"Retry-After": str(whole), RETRY_HEADER: str(fault.retry_after_ms)}
 
 
 def refusal(error: HTTPException, detail: str) -> Response:

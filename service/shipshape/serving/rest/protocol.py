@@ -24,6 +24,7 @@ from shipshape.telemetry import new_request_id
 
 HEADER_BYTES = 64 * 2**10  # of one request; and at most so many come without anything of it being complete
 HEAD_S = 20.0  # in which the headers of a request must come, once they began to
+REST_S = 20.0  # in which the rest of a body comes, once its request was answered without
 LINGER_S = 1.0  # in which a client that is still sending gets to read why it was refused
 MOST_PIPELINED = 1024  # requests on one connection that wait for the one before them
 MOST_CONNECTIONS = 4096
@@ -41,6 +42,7 @@ class Protocol(HttpToolsProtocol):
         super().connection_made(transport)
         self._heading = self._in_body = False  # which part of a request is on its way
         self._silent = 0  # bytes since anything of a request was complete
+        self._answered = 0.0  # when the last answer was complete, monotonic seconds
         tls: ssl.SSLObject | None = transport.get_extra_info("ssl_object")
         certificate = _name(tls.getpeercert() or {}) if tls is not None else None
         self._connection = Connection(client_name(None, certificate, self.client[0] if self.client else ""))
@@ -73,8 +75,8 @@ class Protocol(HttpToolsProtocol):
             return
         if self._silent > HEADER_BYTES:
             self._refuse(_too_large())
-        elif self._heading and not self._owed():
-            self._close_in(self.scope["state"]["received"] + HEAD_S - time.monotonic())
+        elif not self._owed():
+            self._close_in(self._patience())
 
     def on_message_begin(self) -> None:
         """The first byte of a request."""
@@ -108,6 +110,7 @@ class Protocol(HttpToolsProtocol):
     def on_response_complete(self) -> None:
         """The end of an answer."""
         self._joined.flush()
+        self._answered = time.monotonic()
         super().on_response_complete()
 
     def _check_head(self) -> None:
@@ -140,6 +143,14 @@ class Protocol(HttpToolsProtocol):
     def _close_in(self, seconds: float) -> None:
         """Close, unless something comes before."""
         self.timeout_keep_alive_task = self.loop.call_later(seconds, self.timeout_keep_alive_handler)
+
+    def _patience(self) -> float:
+        """Seconds for what comes next from a client that waits for no answer."""
+        if self._heading:
+            return float(self.scope["state"]["received"] + HEAD_S - time.monotonic())
+        if self._in_body:
+            return self._answered + REST_S - time.monotonic()
+        return self.timeout_keep_alive
 
     def _owed(self) -> bool:
         """Whether a request whose headers came is still to be answered."""

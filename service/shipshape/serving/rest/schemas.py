@@ -211,6 +211,7 @@ class ContactError(BaseModel):
 
     error: str = Field(description="The kind, as in a problem document.")
     detail: str = Field(description="What was expected and what came.")
+    retry_after_ms: int | None = Field(None, description="When to come back, of what is overloaded, if known.")
 
 
 class ContactResult(BaseModel):

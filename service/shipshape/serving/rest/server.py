@@ -2,6 +2,7 @@
 
 import socket
 import ssl
+import sys
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -14,6 +15,7 @@ from shipshape.serving.rest.protocol import Protocol
 from shipshape.serving.tls import Tls
 
 KEEP_ALIVE_S = 75  # longer than proxies keep idle connections, else they meet a closed one now and then
+READ_S = 60.0  # in which a client takes some of what is on its way to it, or loses its connection and the answer
 
 
 class RestDoor:
@@ -98,6 +100,8 @@ def _listener(host: str, port: int, name: str, *, shared: bool) -> socket.socket
     # Of TCP by name: else asyncio's own loop takes it for something that needs no TCP_NODELAY.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    if sys.platform == "linux":  # connections inherit it; elsewhere who never reads keeps the answer in memory
+        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(READ_S * 1e3))
     if shared:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
     try:

@@ -1,0 +1,58 @@
+"""How large an answer in JSON may be: what is foreseen bounds what comes, and too much of it is refused."""
+
+import numpy as np
+import pytest
+
+from oip.real import real
+from oip.wire import by_binary
+from serving.fakes import cluster, doors
+from shipshape.sample import sample_contact
+from shipshape.serving.encoding import Wishes
+from shipshape.serving.rest.answers import MOST_MIB, most_bytes
+from shipshape.types import Contact
+
+__all__ = ["doors", "real"]
+
+PACKED = {"Content-Type": "application/octet-stream"}
+WISHES = ("restored", "images", "png")
+
+
+@pytest.mark.parametrize("preset", ["best", "paper"])
+@pytest.mark.parametrize("count", [60, 6000])
+def test_no_answer_is_longer_than_foreseen(real, preset, count):
+    random = np.random.default_rng(0)
+    points = random.choice(sample_contact().points_level, count) + random.normal(0, 0.05, (count, 3))
+    contact = Contact(points.astype(np.float32))
+    for wished in ((), *((name,) for name in WISHES), WISHES):
+        query = {"preset": preset} | {f"include_{name}": "true" for name in wished}
+        content = contact.points_level.tobytes()
+        answer = real.rest.post("/v1/recognise", params=query, content=content, headers=PACKED)
+        assert answer.status_code == 200
+        foreseen = most_bytes([contact], Wishes(**dict.fromkeys(wished, True)))
+        assert len(answer.content) <= foreseen <= 10 * len(answer.content)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "each", "wished"), [(100, 40, "png"), (69, 20_000, "restored")], ids=["pictures", "clouds"]
+)
+def test_a_scan_that_wishes_for_too_much_is_refused_and_less_of_it_is_not(doors, contacts, each, wished):
+    content = cluster(each).tobytes()
+
+    def scan(count, **more):
+        query = {"counts": ",".join([str(each)] * count)} | more
+        return doors.rest.post("/v1/scan", params=query, content=content * count, headers=PACKED)
+
+    refused = scan(contacts, **{f"include_{wished}": "true"})
+    assert (refused.status_code, refused.json()["error"]) == (413, "too_large")
+    assert refused.json()["detail"].startswith(
+        f"expected a request for at most {MOST_MIB} MiB of JSON, got one for"
+    )
+    assert scan(contacts // 4, **{f"include_{wished}": "true"}).status_code == 200
+    assert scan(contacts).status_code == 200
+
+
+def test_clouds_of_the_open_inference_protocol_are_limited_in_json_and_not_as_raw_data(doors):
+    inputs = {"points": np.tile(cluster(20_000), (64, 1)), "counts": np.full(64, 20_000, np.int32)}
+    refused = by_binary(doors, inputs, ["restored_points"], {"binary_data_output": False})
+    assert (refused.status, refused.kind) == (413, "too_large")
+    assert len(by_binary(doors, inputs, ["restored_points"]).outputs["restored_points"]) == 64 * 40_000
