@@ -65,6 +65,6 @@ def test_the_largest_scan_without_the_memory_for_its_answer(tmp_path):
             )
         assert (answer.status_code, answer.json()["error"]) == (413, "too_large")
         assert answer.json()["detail"].startswith(
-            "expected a request for at most 64 MiB of JSON, got one for up to"
+            "expected a scan whose answer takes at most 64 MiB in JSON, got one"
         )
         service.answers_good_requests()

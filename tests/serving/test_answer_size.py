@@ -1,15 +1,17 @@
-"""How large an answer in JSON may be: what is foreseen bounds what comes, and too much of it is refused."""
+"""How large the answer to a scan may be: what is foreseen bounds what comes, and too much of it is refused."""
 
+import grpc
 import numpy as np
 import pytest
 
 from oip.real import real
-from oip.wire import by_binary
-from serving.fakes import cluster, doors
+from oip.wire import by_binary, by_grpc_raw
+from serving.fakes import PATIENCE, cluster, doors
 from shipshape.sample import sample_contact
+from shipshape.serving.answer_size import MOST_MIB, most_bytes
 from shipshape.serving.encoding import Wishes
-from shipshape.serving.rest.answers import MOST_MIB, most_bytes
 from shipshape.types import Contact
+from shipshape.v1 import shipshape_pb2 as pb
 
 __all__ = ["doors", "real"]
 
@@ -45,14 +47,22 @@ def test_a_scan_that_wishes_for_too_much_is_refused_and_less_of_it_is_not(doors,
     refused = scan(contacts, **{f"include_{wished}": "true"})
     assert (refused.status_code, refused.json()["error"]) == (413, "too_large")
     assert refused.json()["detail"].startswith(
-        f"expected a request for at most {MOST_MIB} MiB of JSON, got one for"
+        f"expected a scan whose answer takes at most {MOST_MIB} MiB in JSON, got one that may take "
     )
     assert scan(contacts // 4, **{f"include_{wished}": "true"}).status_code == 200
     assert scan(contacts).status_code == 200
 
 
-def test_clouds_of_the_open_inference_protocol_are_limited_in_json_and_not_as_raw_data(doors):
-    inputs = {"points": np.tile(cluster(20_000), (64, 1)), "counts": np.full(64, 20_000, np.int32)}
-    refused = by_binary(doors, inputs, ["restored_points"], {"binary_data_output": False})
-    assert (refused.status, refused.kind) == (413, "too_large")
-    assert len(by_binary(doors, inputs, ["restored_points"]).outputs["restored_points"]) == 64 * 40_000
+def test_every_door_refuses_the_same_scan(doors):
+    points, count = cluster(20_000), 69
+    inputs = {"points": np.tile(points, (count, 1)), "counts": np.full(count, len(points), np.int32)}
+    for wished in (["restored_points"], ["probability"]):
+        outcomes = [infer(doors, inputs, wished).kind for infer in (by_binary, by_grpc_raw)]
+        scan = pb.RecogniseScanRequest(contacts=[pb.Contact(points=points.tobytes())] * count)
+        scan.options.include_restored = wished == ["restored_points"]
+        try:
+            doors.stub.RecogniseScan(scan, timeout=PATIENCE)
+            outcomes.append("")
+        except grpc.RpcError as error:
+            outcomes.append(dict(error.trailing_metadata())["shipshape-error"])
+        assert outcomes == (["too_large"] * 3 if scan.options.include_restored else [""] * 3)

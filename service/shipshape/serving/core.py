@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar
 from shipshape.errors import Cancelled, DeadlineExceeded, InvalidInput, NotReady
 from shipshape.executor import Executor, Lane, Task, Ticket
 from shipshape.serving.age import age_of, time_left
+from shipshape.serving.answer_size import check_answer
 from shipshape.serving.encoding import Limits, Wishes, check_contacts
 from shipshape.serving.faults import Fault, fault_of
 from shipshape.serving.model import Encode, Model, Order, Reply
@@ -191,9 +192,10 @@ class Core:
             deadline: From `deadline_in`, for all contacts.
 
         Raises:
-            InvalidInput, Overloaded, DeadlineExceeded, NotReady: What concerns the scan as a whole.
+            InvalidInput, TooLarge, Overloaded, DeadlineExceeded, NotReady: What concerns the scan as a whole.
         """
         check_contacts(len(contacts), self.limits)
+        check_answer(contacts, wishes)
         deadline = self._check(model, wishes, deadline)
         entries = [_task(model, contact, wishes, encode, deadline) for contact in contacts]
         tickets = iter(self._executor.submit_all([entry for entry in entries if isinstance(entry, Task)]))

@@ -10,18 +10,14 @@ import orjson
 from jaxtyping import UInt8
 
 from shipshape.budget import Report
-from shipshape.errors import TooLarge
 from shipshape.serving.core import Capacity
 from shipshape.serving.encoding import Limits, Wishes, flat_scores
 from shipshape.serving.faults import Fault
 from shipshape.serving.model import Answer, Model, Reply
 from shipshape.serving.timing import Timeouts
-from shipshape.types import Box, Contact, ImagePair, RestoredCloud
+from shipshape.types import Box, ImagePair, RestoredCloud
 
 Json = dict[str, Any]
-MOST_MIB = 64  # of an answer: it is in memory several times over while it is written
-# What parts of a recognition take at most, bytes; points are those measured, and as many inferred as images hold.
-BARE_BYTES, RESTORED_POINT_BYTES, INFERRED_POINTS, IMAGES_BYTES, PNG_BYTES = 4096, 42, 4096, 20_000, 700_000
 
 
 def to_bytes(value: Json) -> bytes:
@@ -68,24 +64,6 @@ def from_answer(answer: Answer, wishes: Wishes) -> Json:
 def encode(answer: Answer, wishes: Wishes) -> bytes:
     """The JSON text of a `RecognitionAnswer`; on the worker."""
     return to_bytes(from_answer(answer, wishes))
-
-
-def most_bytes(contacts: Sequence[Contact | Exception], wishes: Wishes) -> int:
-    """How long the answer to these contacts may be: a few bytes may wish for megabytes."""
-    each = BARE_BYTES + wishes.images * IMAGES_BYTES + wishes.png * PNG_BYTES
-    if wishes.restored:
-        each += INFERRED_POINTS * RESTORED_POINT_BYTES
-    points = sum(len(contact.points_level) for contact in contacts if isinstance(contact, Contact))
-    return len(contacts) * each + wishes.restored * points * RESTORED_POINT_BYTES
-
-
-def check_bytes(most: int) -> None:
-    """Raises TooLarge for an answer of so many bytes of JSON."""
-    if most > MOST_MIB * 2**20:
-        raise TooLarge(
-            f"expected a request for at most {MOST_MIB} MiB of JSON, got one for up to {most / 2**20:.0f} MiB: "
-            f"send fewer contacts at a time, ask for less of each (restored points and pictures), or use gRPC"
-        )
 
 
 def joined(contact_ids: Sequence[str], outcomes: Sequence[Reply[bytes] | Fault]) -> bytes:

@@ -22,11 +22,9 @@ from shipshape.serving.oip.inference import InferRequest
 from shipshape.serving.oip.models import NAME
 from shipshape.serving.oip.parameters import RAW_SIZE, check_known
 from shipshape.serving.oip.tensors import Datatype, Tensor, from_raw, from_values, to_raw
-from shipshape.serving.rest.answers import check_bytes
 from shipshape.serving.rest.requests import sentence
 
 JSON_BYTES_HEADER = "Inference-Header-Content-Length"
-NUMBER_BYTES = 14  # of a number of a cloud in JSON; texts are few
 RAW_OUTPUT, RAW_OUTPUTS = "binary_data", "binary_data_output"
 # By type, not by what numpy makes of it: true and false would become 1 and 0 among numbers.
 ELEMENTS: dict[Datatype, set[type]] = {
@@ -131,17 +129,13 @@ def write_answer(fields: Mapping[str, Any], tensors: Sequence[Tensor], asked: As
 
     Returns:
         The bytes, and how many of them are JSON when raw tensors follow.
-
-    Raises:
-        TooLarge: The JSON could fill the memory.
     """
-    check_bytes(NUMBER_BYTES * sum(len(tensor.values) for tensor in tensors if not _is_raw(tensor, asked)))
     raw: list[bytes] = []
     outputs: list[dict[str, Any]] = []
     for tensor in tensors:
         name = tensor.spec.name
         output: dict[str, Any] = {"name": name, "datatype": tensor.spec.datatype, "shape": tensor.shape}
-        if _is_raw(tensor, asked):
+        if asked.raw_outputs is None or name in asked.raw_outputs:
             raw.append(to_raw(tensor))
             output["parameters"] = {RAW_SIZE: len(raw[-1])}
         else:
@@ -221,10 +215,6 @@ def _flag(parameters: dict[str, Any], name: str, *, default: bool) -> bool:
     if not isinstance(value, bool):
         raise InvalidInput(f"expected parameter {name} to be true or false, got {value!r:.40}")
     return value
-
-
-def _is_raw(tensor: Tensor, asked: Asked) -> bool:
-    return asked.raw_outputs is None or tensor.spec.name in asked.raw_outputs
 
 
 def _listed(tensor: Tensor) -> Any:

@@ -134,7 +134,6 @@ class Routes:
                 parsed = parse()
                 outcome.contacts = parsed.count
                 check_contacts(parsed.count, self._core.limits)
-                answers.check_bytes(answers.most_bytes(parsed.contacts, parsed.wishes))
                 share.take(parsed.count)
                 scan = self._core.submit_scan(model, parsed.contacts, parsed.wishes, answers.encode, deadline)
                 return parsed.contact_ids, scan, parsed.wishes
