@@ -91,7 +91,7 @@ class Executor:
                 entry.since = now
             self.give_out()
         for entry in entries:
-            entry.ticket.future.add_done_callback(partial(self._settled, entry))
+            entry.ticket.future.add_done_callback(partial(self._settled, [entry]))
             self._deadlines.watch(entry.ticket)
         return [entry.ticket for entry in entries]
 
@@ -148,8 +148,7 @@ class Executor:
     def wait(self, lane: Lane) -> float:
         """Seconds until a worker will probably be free for new work of this lane."""
         with self._lock:
-            now = self.clock()
-            given = sum(hand.seconds(lane, now) for hand in self._hands())
+            given = sum(hand.seconds(lane, self.clock()) for hand in self._hands())
             return (self._queues.seconds(lane) + given) / self.workers
 
     @property
@@ -291,7 +290,8 @@ class Executor:
             self._crews.append(self._threads)
         return self._threads
 
-    def _settled(self, entry: Entry, future: Future[Any]) -> None:
+    def _settled(self, held: list[Entry], future: Future[Any]) -> None:
+        entry = held.pop()  # taken out, else ticket and entry, and so the model, would know each other for ever
         with self._lock:
             self._counts[entry.task.spare].settle(entry.ticket)
             if self._queues.remove(entry.task.lane, entry):  # left or expired before a worker came
