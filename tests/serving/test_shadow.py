@@ -1,115 +1,17 @@
 """A shadow bundle: what callers asked is computed by it too and compared, and no caller can tell."""
 
-import gc
-import hashlib
 import json
 import logging
 import threading
-import weakref
-from contextlib import contextmanager
-from dataclasses import replace
+from concurrent.futures import Future
 
-import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from serving.fakes import DIGEST, PATIENCE, FakePipeline, cluster, fake_model, running, until
-from shipshape.cli import main
-from shipshape.errors import BundleError, Cancelled, Conflict
+from serving.fakes import DIGEST, PATIENCE, cluster
+from serving.shadowed import OTHER, administered, compared
 from shipshape.serving import shadow as module
-from shipshape.types import Rung
-
-TOKEN = "a token that nobody guesses"
-OTHER = "cd" * 32
-NAMES = ("first", "same", "second", "crash", "hold", "turned", "bad", "odd")
-
-
-class Shadowed(FakePipeline):
-    """Answers as the fake pipeline does, but for what a bundle is named after."""
-
-    def __init__(self, name):
-        super().__init__()
-        self.name = name
-        self.halted = threading.Semaphore(0)
-        self.proceed = threading.Event()
-
-    def finish(self, work, stage_ms, rung=Rung.FULL, rung_reason=""):
-        found = super().finish(work, stage_ms, rung, rung_reason)
-        if self.name == "second":
-            probabilities = {"tug": 0.25, "rhib": 0.625, "unknown": 0.125}
-            return replace(found, vessel="rhib", probability=0.625, probabilities=probabilities)
-        if self.name == "turned":
-            return replace(found, heading=found.heading - 3.0)
-        return found
-
-    def _prior(self, work):
-        asked = work.contact.contact_id.startswith("contact-")  # not that of the try-out
-        if asked and self.name == "crash":
-            raise RuntimeError("planned")
-        if asked and self.name == "hold":
-            self.halted.release()
-            assert self.proceed.wait(PATIENCE)
-        super()._prior(work)
-
-
-class Service:
-    """A running service with an admin door, and every shadow pipeline that it loaded, by name."""
-
-    def __init__(self, doors, admin, loaded):
-        self.doors, self.admin, self.loaded = doors, admin, loaded
-
-    def call(self, path, **body):
-        answer = (
-            self.admin.post(f"/admin/{path}", json=body) if path != "status" else self.admin.get("/admin/status")
-        )
-        assert answer.status_code == 200, answer.text
-        return answer.json()
-
-    def shadow(self):
-        return self.call("status")["shadow"]
-
-    def ask(self, count=1, **fields):
-        for index in range(count):
-            answer = self.doors.ask_rest(cluster(), contact_id=f"contact-{index}", **fields)
-            assert answer.status_code == 200, answer.text
-            assert (answer.json()["vessel"], answer.json()["bundle"]) == ("tug", DIGEST)
-
-    def metrics(self):
-        """Of the shadow, without the times at which counters began: values by name and labels."""
-        return {
-            (sample.name, *sample.labels.values()): sample.value
-            for family in text_string_to_metric_families(self.doors.rest.get("/metrics").text)
-            for sample in family.samples
-            if sample.name.startswith("shipshape_shadow") and not sample.name.endswith("_created")
-        }
-
-
-@contextmanager
-def administered(tmp_path, **more):
-    for name in NAMES:
-        (tmp_path / "bundles" / name).mkdir(parents=True)
-    tokens = tmp_path / "admin.tokens"
-    tokens.write_text(f"ops {hashlib.sha256(TOKEN.encode()).hexdigest()}\n")
-    loaded = {}
-
-    def load(folder):
-        if folder.name == "bad":
-            raise BundleError("expected sha256 1 of prior.onnx, got 2")
-        if folder.name == "odd":
-            raise ZeroDivisionError
-        loaded[folder.name] = Shadowed(folder.name)
-        digest = DIGEST if folder.name in ("first", "same") else OTHER
-        return fake_model(loaded[folder.name], name=folder.name, digest=digest)
-
-    settings = {"admin_port": 0, "admin_token_file": tokens, "bundle": tmp_path / "bundles/first"}
-    settings |= {"shadow_share": 1.0, "workers": 2, **more}
-    with running(load=load, **settings) as doors:
-        url = f"http://127.0.0.1:{doors.addresses.admin_port}"
-        headers = {"Authorization": f"Bearer {TOKEN}"}
-        with httpx.Client(base_url=url, headers=headers, timeout=PATIENCE, trust_env=False) as admin:
-            yield Service(doors, admin, loaded)
-            for pipeline in loaded.values():
-                pipeline.proceed.set()
+from shipshape.telemetry import JsonLines
 
 
 @pytest.fixture(scope="module")
@@ -125,17 +27,6 @@ def service(shared):
     for pipeline in shared.loaded.values():
         pipeline.proceed.set()
     shared.call("unshadow")
-
-
-def compared(service, **expected):
-    """Wait for these counts, and see that there are no others."""
-    until(lambda: sum(counts(service).values()) >= sum(expected.values()))
-    assert {verdict: count for verdict, count in counts(service).items() if count} == expected
-
-
-def counts(service):
-    shadow = service.shadow()
-    return {verdict: shadow[verdict] for verdict in ("same", "differs", "failed", "dropped")}
 
 
 def test_the_same_bundle_says_the_same(service):
@@ -174,8 +65,6 @@ def test_another_bundle_differs_and_the_log_says_how(service, caplog):
 
 def test_the_log_line_names_the_request(service):
     lines, handler = [], logging.StreamHandler()
-    from shipshape.telemetry import JsonLines  # noqa: PLC0415  # formats as the service does
-
     handler.emit = lambda record: lines.append(json.loads(JsonLines().format(record)))
     logger = logging.getLogger(module.__name__)
     level = logger.level
@@ -272,8 +161,6 @@ class DegradedTicket:
     degraded = True
 
     def __init__(self):
-        from concurrent.futures import Future  # noqa: PLC0415  # the only test that makes one
-
         self.future = Future()
 
     def settle(self):
@@ -318,125 +205,3 @@ def test_a_share_of_the_contacts_is_compared(tmp_path, monkeypatch):
         monkeypatch.setattr(module.random, "random", lambda: next(chances))
         service.ask(4)
         compared(service, differs=2)
-
-
-def test_a_bad_one_is_refused_and_changes_nothing(service):
-    service.call("shadow", folder="second")
-    for folder, kind in (("bad", "bundle_refused"), ("odd", "bundle_refused"), ("../..", "invalid_input")):
-        answer = service.admin.post("/admin/shadow", json={"folder": folder})
-        assert answer.json()["error"] == kind
-    status = service.call("status")
-    assert (status["shadow"]["name"], status["bundle"]["digest"]) == ("second", DIGEST)
-    service.ask()
-    compared(service, differs=1)
-
-
-def test_another_one_takes_its_place_and_counts_anew(service):
-    service.call("shadow", folder="second")
-    service.ask(2)
-    compared(service, differs=2)
-    assert service.call("shadow", folder="turned")["shadow"]["name"] == "turned"
-    service.ask()
-    compared(service, same=1)
-
-
-def test_without_a_shadow_nothing_is_watched(service):
-    core = service.doors.service._core
-    assert core._watch is None
-    service.call("shadow", folder="second")
-    assert core._watch is not None
-    assert service.call("unshadow")["shadow"] is None
-    assert core._watch is None
-    assert not any(name == "shipshape_shadow_info" for name, *_ in service.metrics())
-    assert service.call("unshadow")["shadow"] is None, "it may be repeated"
-
-
-def test_a_shadow_that_was_unloaded_is_freed_at_once(service):
-    freed = threading.Event()
-    gc.disable()  # collections come when they come: nothing may wait for them
-    try:
-        service.call("shadow", folder="second")
-        # What only the model knows: the fake pipeline knows itself.
-        weakref.finalize(service.doors.service.models.shadow.model.render, freed.set)
-        service.ask(2)
-        compared(service, differs=2)
-        service.call("unshadow")
-        assert freed.wait(PATIENCE)
-    finally:
-        gc.enable()
-
-
-def test_promote_and_roll_back(service):
-    service.call("shadow", folder="second")
-    status = service.call("promote")
-    try:
-        assert (status["bundle"]["name"], status["previous"]["digest"], status["shadow"]) == (
-            "second",
-            DIGEST,
-            None,
-        )
-        assert service.doors.rest.get("/v1/model").json()["bundle"] == OTHER
-        refused = service.admin.post("/admin/promote")
-        assert (refused.status_code, refused.json()["error"]) == (409, "conflict")
-    finally:
-        assert service.call("rollback")["bundle"]["digest"] == DIGEST
-
-
-def test_promoting_the_running_bundle_changes_nothing(service):
-    before = service.call("shadow", folder="same")
-    after = service.call("promote")
-    assert (after["bundle"], after["previous"]) == (before["bundle"], before["previous"])
-    assert after["shadow"] is None
-
-
-def test_one_change_at_a_time(service):
-    models = service.doors.service.models
-    with models._alone():
-        for change in (lambda: models.cast_shadow("second"), models.end_shadow, models.promote):
-            with pytest.raises(Conflict, match="expected one change of the bundle at a time"):
-                change()
-
-
-def test_no_call_without_the_token(service):
-    for path in ("shadow", "unshadow", "promote"):
-        url = f"{service.admin.base_url}/admin/{path}"
-        answer = httpx.post(url, json={"folder": "second"}, trust_env=False)
-        assert (answer.status_code, answer.json()["error"]) == (401, "unauthenticated")
-        assert service.doors.rest.post(f"/admin/{path}", headers=service.admin.headers).status_code == 404
-    contract = service.admin.get("/openapi.json")
-    assert {"/admin/shadow", "/admin/unshadow", "/admin/promote"} <= contract.json()["paths"].keys()
-
-
-def test_a_stop_ends_the_shadow(tmp_path):
-    with administered(tmp_path) as service:
-        service.call("shadow", folder="hold")
-        service.ask()
-        assert service.loaded["hold"].halted.acquire(timeout=PATIENCE)
-        comparing = service.doors.service.models.comparing
-        service.loaded["hold"].proceed.set()
-        service.doors.service.stop()
-        assert comparing._run is None
-        with pytest.raises(Cancelled):
-            comparing.begin(fake_model(FakePipeline()), apart=True)
-
-
-def test_the_command_line(service, tmp_path, capsys):
-    token = tmp_path / "admin.token"
-    token.write_text(f"{TOKEN}\n")
-
-    def call(*words):
-        return main(["admin", *words, "--url", str(service.admin.base_url), "--token-file", str(token)])
-
-    assert call("shadow", "second") == 0
-    assert json.loads(capsys.readouterr().out)["shadow"]["name"] == "second"
-    assert call("unshadow") == 0
-    assert json.loads(capsys.readouterr().out)["shadow"] is None
-    assert call("promote") == 1
-    assert capsys.readouterr().err == (
-        "shipshape: expected a shadow to promote, got a service that has none: load it with shadow\n"
-    )
-    for words in (["shadow"], ["unshadow"], ["promote"]):
-        with pytest.raises(SystemExit) as ended:
-            main(["admin", *words, "--help"])
-        assert ended.value.code == 0
-        assert f"example:\n  shipshape admin {words[0]}" in capsys.readouterr().out
