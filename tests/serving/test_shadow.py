@@ -2,16 +2,20 @@
 
 import json
 import logging
+import math
 import threading
-from concurrent.futures import Future
+import time
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from serving.fakes import DIGEST, PATIENCE, cluster
 from serving.shadowed import OTHER, administered, compared
+from shipshape.executor import Ticket
 from shipshape.serving import shadow as module
+from shipshape.serving.model import Reply
 from shipshape.telemetry import JsonLines
+from shipshape.types import Rung
 
 
 @pytest.fixture(scope="module")
@@ -147,24 +151,19 @@ def test_what_is_asked_in_the_shadow_counts_for_no_caller(service):
     assert (own.offered - spare.offered, own.completed - spare.completed, own.pending) == (10, 10, 0)
 
 
-def test_degraded_answers_are_not_compared(service):
-    ticket = DegradedTicket()
+@pytest.mark.parametrize("end", ["degraded", "failed", "cancelled"])
+def test_what_was_not_answered_in_full_is_not_compared(service, end):
     service.call("shadow", folder="same")
-    run = service.doors.service.models.comparing._run
-    run.sample(1.0, ticket, None, None)
-    ticket.settle()
+    ticket = Ticket(math.inf, time.monotonic)
+    service.doors.service.models.comparing._run.sample(1.0, ticket, None, None)
+    if end == "degraded":
+        ticket.succeed(Reply(b"", Rung.HEADING_AND_BOX, {}))
+    elif end == "failed":
+        ticket.fail(RuntimeError("planned"))
+    else:
+        ticket.future.cancel()
     service.ask()
     compared(service, same=1)
-
-
-class DegradedTicket:
-    degraded = True
-
-    def __init__(self):
-        self.future = Future()
-
-    def settle(self):
-        self.future.set_result(None)
 
 
 def test_what_finds_no_room_is_dropped(service):

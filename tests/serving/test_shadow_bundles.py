@@ -1,10 +1,12 @@
 """A real bundle beside another, each with worker processes of its own: compared, promoted under load, unloaded."""
 
+import gc
 import os
 import re
 import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 
 import psutil
@@ -15,7 +17,8 @@ from serving.fakes import running, until
 from serving.processes import MODELS
 from shipshape.bundle import load_bundle
 from shipshape.bundle_writer import write_manifest
-from shipshape.errors import BundleError
+from shipshape.errors import BundleError, Conflict
+from shipshape.executor import ProcessCrew
 from shipshape.sample import sample_contact
 from shipshape.serving import shadow
 from shipshape.serving.remote_model import RemoteModel
@@ -205,6 +208,7 @@ def test_a_shadow_whose_workers_are_stuck_or_die_harms_nobody(doors, models, wid
     for worker in workers:
         worker.kill()
     until(lambda: all(gone(worker) for worker in workers))
+    until(lambda: doors.service.health.ready)
     assert doors.service.executor.sound
     monkeypatch.undo()
     processes_of(models.shadow.model)
@@ -212,3 +216,33 @@ def test_a_shadow_whose_workers_are_stuck_or_die_harms_nobody(doors, models, wid
     compared(models, SAME, 1)
     counts = doors.service.executor.counts()
     assert (counts.failed, counts.refused, counts.pending) == (0, 0, 0)
+
+
+def test_stuck_workers_end_with_the_shadow_too(doors, models, wider, monkeypatch):
+    """And wait for no collection: an error of theirs must not keep the model."""
+    monkeypatch.setattr(shadow, "PATIENCE_S", 0.1)
+    workers = processes_of(models.cast_shadow(wider).model)
+    for worker in workers:
+        worker.suspend()
+    gc.disable()
+    try:
+        ask(doors)
+        compared(models, DROPPED, 1)
+        models.end_shadow()
+        for worker in workers:
+            with suppress(psutil.NoSuchProcess):
+                worker.resume()  # those that had no work only have to look up
+        until(lambda: all(gone(worker) for worker in workers))
+    finally:
+        gc.enable()
+
+
+def test_a_shadow_without_its_workers_is_not_promoted(doors, models, wider, monkeypatch):
+    kept = models.cast_shadow(wider)
+    with monkeypatch.context() as lacking:
+        lacking.setattr(ProcessCrew, "whole", False)
+        with pytest.raises(Conflict, match="expected a shadow with all its workers, got one that lacks some"):
+            models.promote()
+    assert models.shadow is kept
+    assert models.promote() is kept
+    assert ask(doors)[0] == kept.model.bundle.digest

@@ -113,7 +113,7 @@ class Models:
         """Let the shadow answer; the model before is kept for `rollback`.
 
         Raises:
-            Conflict: There is none, or another call is under way.
+            Conflict: There is none, it has lost workers, or another call is under way.
             Cancelled: The service stops.
         """
         with self._alone():

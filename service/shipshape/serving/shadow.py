@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from shipshape.errors import Cancelled
+from shipshape.errors import Cancelled, Conflict
 from shipshape.executor import Executor, Lane, Ticket
 from shipshape.sample import sample_contact
 from shipshape.serving.comparison import Difference, Numbers, compare, numbers_of
 from shipshape.serving.core import Core
 from shipshape.serving.encoding import Wishes
-from shipshape.serving.model import Model, Order
+from shipshape.serving.model import Model, Order, Reply
 from shipshape.serving.shadow_metrics import ShadowMetrics, Verdict
 from shipshape.telemetry import request_id
 from shipshape.types import Contact, Options, Rung
@@ -92,9 +92,18 @@ class Shadow:
             self._core.watch(partial(self._run.sample, self._share))
 
     def end(self, *, promoted: bool = False) -> None:
-        """Compare no more; `promoted`: the shadow is about to answer callers, and its workers are theirs."""
+        """Compare no more.
+
+        Args:
+            promoted: The shadow is about to answer callers, and its workers are theirs.
+
+        Raises:
+            Conflict: It was to be promoted and lacks workers; nothing has changed.
+        """
         with self._lock:
             if promoted and self._apart is not None and (crew := _crew_of(self._apart)) is not None:
+                if not crew.whole:
+                    raise Conflict("expected a shadow with all its workers, got one that lacks some: ask again")
                 self._executor.join(crew)
             self._end()
 
@@ -130,7 +139,8 @@ class _Run:
     def __init__(
         self, executor: Executor, model: Model, running: Callable[[], Model], metrics: ShadowMetrics
     ) -> None:
-        self.counts: Counter[Verdict] = Counter()
+        self.counts = Counter(dict.fromkeys(Verdict, 0))
+        self._counting = threading.Lock()
         self._executor = executor
         self._model: Model | None = model
         self._running = running
@@ -144,8 +154,7 @@ class _Run:
     def sample(self, share: float, ticket: Ticket[Any], contact: Contact, options: Options) -> None:
         """A contact was admitted; called before its caller waits for it."""
         if random.random() < share:
-            whose = request_id.get()
-            ticket.future.add_done_callback(partial(self._settled, ticket, contact, options, whose))
+            ticket.future.add_done_callback(partial(self._settled, contact, options, request_id.get()))
 
     def end(self) -> None:
         """Wait for nothing; let go of the model."""
@@ -156,12 +165,12 @@ class _Run:
         self._thread.join(END_S)
         self._model = None  # callers that still wait for their answers know this object
 
-    def _settled(
-        self, ticket: Ticket[Any], contact: Contact, options: Options, whose: str, future: Future[Any]
-    ) -> None:
+    def _settled(self, contact: Contact, options: Options, whose: str, future: Future[Reply[Any]]) -> None:
         """Called on the thread that has the answer: no more than note it down."""
-        if self._ended.is_set() or future.exception() is not None or ticket.degraded:
-            return  # the shadow computes the full answer alone
+        if self._ended.is_set() or future.cancelled() or future.exception() is not None:
+            return
+        if future.result().rung is not Rung.FULL:
+            return  # such an answer says more of the moment than of the bundle
         if self._backlog.qsize() >= BACKLOG:
             self._tell(Verdict.DROPPED)
         else:
@@ -210,10 +219,12 @@ class _Run:
             ticket.cancel()  # does nothing to one that is settled
             return ticket.future.result().content
         finally:
-            self._under_way = None  # which knows the model, and with it its workers
+            self._under_way = None  # it knows the model, and with it its workers
+            del model, task, ticket  # else an error would know them, as they know the error
 
     def _tell(self, verdict: Verdict, found: Difference | None = None) -> None:
-        self.counts[verdict] += 1
+        with self._counting:
+            self.counts[verdict] += 1
         self._metrics.count(verdict)
         if found is None:
             return
