@@ -17,6 +17,9 @@ CALLS = {
     "status": ("GET", "/admin/status"),
     "swap": ("POST", "/admin/bundle"),
     "rollback": ("POST", "/admin/rollback"),
+    "shadow": ("POST", "/admin/shadow"),
+    "unshadow": ("POST", "/admin/unshadow"),
+    "promote": ("POST", "/admin/promote"),
     "drain": ("POST", "/admin/drain"),
     "resume": ("POST", "/admin/resume"),
 }
@@ -25,7 +28,8 @@ CALLS = {
 def admin(arguments: argparse.Namespace) -> int:
     """Make one call; 1 when the service refused it or cannot be reached."""
     method, path = CALLS[arguments.call]
-    body = json.dumps({"folder": str(arguments.folder)}).encode() if arguments.call == "swap" else None
+    # A call that needs a folder has one: `cli` says which.
+    body = json.dumps({"folder": str(arguments.folder)}).encode() if "folder" in arguments else None
     request = urllib.request.Request(_url(arguments.url) + path, body, method=method)
     request.add_header("Authorization", f"Bearer {read_token(arguments.token_file)}")
     request.add_header("Content-Type", "application/json")

@@ -267,17 +267,21 @@ def _add_admin(commands: _Commands) -> None:
         "status": "print its state, its bundles and its counts",
         "swap": "try another bundle out and let it answer",
         "rollback": "let the bundle before the running one answer again",
+        "shadow": "compare another bundle's answers with those of the running one",
+        "unshadow": "unload the shadow",
+        "promote": "let the shadow answer",
         "drain": "not ready any more, still answering",
         "resume": "ready again",
     }.items():
-        folder = " models-2" if call == "swap" else ""
+        of_bundle = call in ("swap", "shadow")
+        folder = " models-2" if of_bundle else ""
         parser = _add(calls, call, summary, f"example:\n  shipshape admin {call}{folder}")
         parser.set_defaults(command="admin", call=call)
         parser.add_argument("--url", default="http://127.0.0.1:9090", help="default: %(default)s")
         parser.add_argument(
             "--token-file", type=Path, default=Path("admin.token"), help="holds the token (default: %(default)s)"
         )
-        if call == "swap":
+        if of_bundle:
             parser.add_argument("folder", type=Path, metavar="DIR", help="below the service's bundle_root")
 
 

@@ -125,6 +125,13 @@ class Settings(BaseSettings):
         description="The admin door takes bundles from folders below this one alone. Absent: the folder that "
         "holds `bundle`.",
     )
+    shadow_share: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="Share of the contacts answered that a shadow bundle (`shipshape admin shadow`) is compared "
+        "on. Each is computed twice more, where workers are free; without a shadow it changes nothing.",
+    )
     max_body_bytes: int = Field(
         16 * 2**20,
         ge=1024,

@@ -1,4 +1,7 @@
-"""Every metric and the log format, in one place; nothing of it leaves the machine unless someone asks for it."""
+"""Every metric and the log format; nothing of it leaves the machine unless someone asks for it.
+
+In one place, but for the metrics of a shadow bundle: `serving.shadow_metrics`.
+"""
 
 import asyncio
 import collections

@@ -256,3 +256,17 @@ def test_the_workers_end_with_a_service_that_is_killed():
     owner.wait()
     owner.stdout.close()
     assert psutil.wait_procs(children, PATIENCE)[1] == []
+
+
+def test_a_crew_that_was_left_computes_and_is_no_matter_of_the_callers(executor, crew):
+    executor.leave(crew)
+    assert executor.submit(task(crew)).result()["seen"] == ["first", "second"]
+    hung = executor.submit(task(crew, first="slow"))
+    assert executor.running == executor.queue_depth == executor.load == 0
+    hung.result()
+    executor.submit(task(crew, first="die")).future.exception(PATIENCE)
+    assert executor.sound
+    until(lambda: crew.whole)
+    assert executor.submit(task(crew)).result()["seen"] == ["first", "second"]
+    executor.join(crew)
+    assert executor.sound

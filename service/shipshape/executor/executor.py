@@ -1,8 +1,7 @@
 """Tasks -> bounded queues, one a lane -> workers, one a core -> answers, in time or not at all.
 
-The slot in the queue and the worker belong to the work, not to the waiter: a caller that leaves frees its
-queue slot at once, but a worker only when the stage under way has ended. What a worker does is said in `worker`,
-how it is reached in `crew` and `process_crew`.
+Slot in the queue and worker belong to the work, not to the waiter: a caller that leaves frees its queue slot at
+once, a worker when the stage under way has ended. What a worker does is in `worker`, how it is reached in `crew`.
 """
 
 import threading
@@ -52,8 +51,7 @@ class Executor:
         self.clock = clock
         self.queue_limit = queue_limit
         self.workers = workers
-        self._on_stage = on_stage
-        self._on_wait = on_wait
+        self._on_stage, self._on_wait = on_stage, on_wait
         self._lock = threading.RLock()  # guards everything below
         self._idle = threading.Condition(self._lock)
         self._queues: Queues[Entry] = Queues()
@@ -61,7 +59,7 @@ class Executor:
         self._crews: list[Crew] = []
         self._threads: ThreadCrew | None = None  # made for the first task that names no crew
         self._open = True
-        self._counts = Counts()
+        self._counts = {spare: Counts() for spare in (False, True)}
         self._deadlines = Deadlines(clock)
 
     def submit(self, task: Task[W, R]) -> Ticket[R]:
@@ -69,7 +67,7 @@ class Executor:
         return self.submit_all([task])[0]
 
     def submit_all(self, tasks: Sequence[Task[W, R]]) -> list[Ticket[R]]:
-        """Queue all of the tasks, which are of one lane, or none of them.
+        """Queue all of the tasks, which are of one lane and all spare or not, or none of them.
 
         Raises:
             Overloaded: they do not all fit into the queue, or would end too late behind what is in it.
@@ -80,11 +78,12 @@ class Executor:
         if not entries:
             return []
         with self._lock:
-            self._counts.offered += len(entries)
+            counts = self._counts[tasks[0].spare]
+            counts.offered += len(entries)
             try:
                 self._admit(entries)
             except Exception:
-                self._counts.refused += len(entries)
+                counts.refused += len(entries)
                 raise
             now = self.clock()
             for entry in entries:
@@ -92,7 +91,7 @@ class Executor:
                 entry.since = now
             self.give_out()
         for entry in entries:
-            entry.ticket.future.add_done_callback(partial(self._settled, entry))
+            entry.ticket.future.add_done_callback(partial(self._settled, [entry]))
             self._deadlines.watch(entry.ticket)
         return [entry.ticket for entry in entries]
 
@@ -126,20 +125,20 @@ class Executor:
                 self._costs.learn(what, size, seconds)
 
     def join(self, crew: Crew) -> None:
-        """Give tasks that name this crew to its workers, until `leave`."""
+        """Count this crew's workers as those of the service, sound only while they are whole, until `leave`."""
         with self._lock:
             self._crews.append(crew)
 
     def leave(self, crew: Crew) -> None:
-        """The crew has no workers any more; what it was given was ended by it."""
+        """The crew has no workers any more, or none for callers: tasks that name it still reach them."""
         with self._lock:
             if crew in self._crews:
                 self._crews.remove(crew)
 
-    def counts(self) -> Counts:
-        """What became of the tasks so far."""
+    def counts(self, *, spare: bool = False) -> Counts:
+        """What became of the callers' tasks so far, or of the spare ones."""
         with self._lock:
-            return replace(self._counts)
+            return replace(self._counts[spare])
 
     def promise(self, rung: Rung[Any], size: float, lane: Lane) -> float:
         """Seconds in which new work of this size and lane would be answered on this rung, as admission sees it."""
@@ -149,8 +148,7 @@ class Executor:
     def wait(self, lane: Lane) -> float:
         """Seconds until a worker will probably be free for new work of this lane."""
         with self._lock:
-            now = self.clock()
-            given = sum(hand.seconds(lane, now) for hand in self._hands())
+            given = sum(hand.seconds(lane, self.clock()) for hand in self._hands())
             return (self._queues.seconds(lane) + given) / self.workers
 
     @property
@@ -198,8 +196,7 @@ class Executor:
         with self._lock:
             self._open = False
             drained = self._idle.wait_for(lambda: not self._queues and not self.running, drain_s)
-            left = list(self._queues)
-            crews = list(self._crews)
+            left, crews = list(self._queues), list(self._crews)
         for entry in left:
             entry.ticket.fail(NotReady("the service stopped before the answer was computed"))
         self._deadlines.stop()
@@ -222,7 +219,7 @@ class Executor:
     def ended(self, hand: Hand, entries: Sequence[Entry]) -> None:
         """A worker has done with some entries, whose tickets are settled."""
         for entry in entries:
-            if entry.began is not None:
+            if entry.began is not None and not entry.task.spare:
                 self._on_wait(entry.task.lane, entry.began - entry.since)
         with self._lock:
             for entry in entries:
@@ -263,15 +260,17 @@ class Executor:
         """The one place that says yes or no; called with the lock held."""
         if not self._open:
             raise NotReady("expected a running service, got one that is stopping")
-        lane = entries[0].task.lane
-        wait = self._check_room(len(entries), lane)
+        if entries[0].task.spare:
+            return  # it takes nobody's place, and no time in what others are promised
+        wait = self._check_room(len(entries), entries[0].task.lane)
         slack = min(entry.task.deadline for entry in entries) - self.clock()
         settle_rungs(entries, self._costs, wait=wait, slack=slack, workers=self.workers)
 
     def _check_room(self, wanted: int, lane: Lane) -> float:
         """Refuse what has no place; else the seconds that it will wait."""
         wait = self.wait(lane)
-        check_room(wanted, lane, limit=self.queue_limit, depth=self.queue_depth, wait=wait)
+        depth = max(0, self.queue_depth - self._counts[True].pending)
+        check_room(wanted, lane, limit=self.queue_limit, depth=depth, wait=wait)
         return wait
 
     def _hands(self) -> Iterable[Hand]:
@@ -291,9 +290,10 @@ class Executor:
             self._crews.append(self._threads)
         return self._threads
 
-    def _settled(self, entry: Entry, future: Future[Any]) -> None:
+    def _settled(self, held: list[Entry], future: Future[Any]) -> None:
+        entry = held.pop()  # taken out, else ticket and entry, and so the model, would know each other for ever
         with self._lock:
-            self._counts.settle(entry.ticket)
+            self._counts[entry.task.spare].settle(entry.ticket)
             if self._queues.remove(entry.task.lane, entry):  # left or expired before a worker came
                 self._idle.notify_all()
             elif not entry.over and isinstance(entry.hand, Hand):

@@ -67,6 +67,7 @@ class Task(Generic[W, R]):
     lane: Lane = Lane.TRACKING
     size: float = 0.0  # what the cost of a stage grows with
     crew: "Crew | None" = None  # whose workers alone can carry it; None: threads of this process
+    spare: bool = False  # asked for by no caller: counted apart, always admitted, never on a cheaper rung
 
 
 class Ticket(Generic[R]):

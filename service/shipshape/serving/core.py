@@ -22,6 +22,7 @@ from shipshape.telemetry import DEGRADED, OK, Metrics
 from shipshape.types import Contact, Options, Rung
 
 C = TypeVar("C")
+Watch = Callable[[Ticket[Any], Contact, Options], None]  # told of each contact that was admitted
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class Scan(Generic[C]):
     """The contacts of one scan on their way: each a ticket, or the error that refused it."""
 
     def __init__(self, entries: Sequence[Ticket[Reply[C]] | Exception]) -> None:
-        self._entries = entries
+        self.entries = entries
         self.tickets = [entry for entry in entries if isinstance(entry, Ticket)]
 
     def outcomes(self) -> list[Reply[C] | Exception]:
@@ -52,9 +53,9 @@ class Scan(Generic[C]):
         if self.tickets:
             patience = min(ticket.remaining() for ticket in self.tickets)
             wait([ticket.future for ticket in self.tickets], min(patience, threading.TIMEOUT_MAX))
-        outcomes = [_outcome(entry) for entry in self._entries]
+        outcomes = [_outcome(entry) for entry in self.entries]
         admitted = [
-            outcome for entry, outcome in zip(self._entries, outcomes, strict=True) if isinstance(entry, Ticket)
+            outcome for entry, outcome in zip(self.entries, outcomes, strict=True) if isinstance(entry, Ticket)
         ]
         for common in (DeadlineExceeded, Cancelled, NotReady):
             if admitted and all(isinstance(outcome, common) for outcome in admitted):
@@ -101,6 +102,7 @@ class Core:
         self._executor = executor
         self._on_age = on_age
         self._model: Model | None = None
+        self._watch: Watch | None = None
         self._refusal = "expected a running service, got one that is still starting"
 
     @property
@@ -116,6 +118,10 @@ class Core:
     def open(self, model: Model) -> None:
         """Take requests from now on, answered by `model`."""
         self._model = model
+
+    def watch(self, watch: Watch | None) -> None:
+        """Tell it of each contact that is admitted from now on; None: tell nobody."""
+        self._watch = watch
 
     def close(self) -> None:
         """Take no more requests; those under way go on."""
@@ -172,7 +178,10 @@ class Core:
             Overloaded, DeadlineExceeded, NotReady: No place, no time, or stopped for good.
         """
         deadline = self._check(model, order.wishes, deadline)
-        return self._executor.submit(model.task(order, deadline))
+        ticket = self._executor.submit(model.task(order, deadline))
+        if (watch := self._watch) is not None:
+            watch(ticket, order.contact, order.wishes.options)
+        return ticket
 
     def submit_scan(
         self,
@@ -199,7 +208,12 @@ class Core:
         deadline = self._check(model, wishes, deadline)
         entries = [_task(model, contact, wishes, encode, deadline) for contact in contacts]
         tickets = iter(self._executor.submit_all([entry for entry in entries if isinstance(entry, Task)]))
-        return Scan([next(tickets) if isinstance(entry, Task) else entry for entry in entries])
+        scan = Scan([next(tickets) if isinstance(entry, Task) else entry for entry in entries])
+        if (watch := self._watch) is not None:
+            for contact, ticket in zip(contacts, scan.entries, strict=True):
+                if isinstance(ticket, Ticket) and isinstance(contact, Contact):
+                    watch(ticket, contact, wishes.options)
+        return scan
 
     def _check(self, model: Model, wishes: Wishes, deadline: float) -> float:
         """The moment at which the answer must be there."""

@@ -1,4 +1,4 @@
-"""The running model and the one before it, swapped and rolled back under load.
+"""The running model, the one before it and its shadow, changed under load.
 
 A swap tries the new one out beside the running one, so that whatever is wrong with it, the running one goes on.
 Requests keep the model they began with.
@@ -13,6 +13,7 @@ from pathlib import Path
 
 from shipshape.errors import BundleError, Cancelled, Conflict
 from shipshape.serving.model import Model
+from shipshape.serving.shadow import Shadow
 
 Load = Callable[[Path], Model]  # raises BundleError
 
@@ -28,21 +29,26 @@ class Placed:
 
 
 class Models:
-    """At most three bundles are in memory: the running one, the one before, and one being tried.
+    """At most four bundles are in memory: the running one, the one before, the shadow, and one being tried.
 
     Args:
         load: Reads and verifies a bundle, one network after the other.
         try_out: Runs whatever a request can ask for; raises what is wrong.
         publish: From here on requests are answered by this model; raises Cancelled when the service stops.
+        comparing: Compares the shadow's answers.
     """
 
-    def __init__(self, load: Load, try_out: Callable[[Model], None], publish: Callable[[Model], None]) -> None:
+    def __init__(
+        self, load: Load, try_out: Callable[[Model], None], publish: Callable[[Model], None], comparing: Shadow
+    ) -> None:
         self._load = load
         self._try_out = try_out
         self._publish = publish
+        self.comparing = comparing
         self._turn = threading.Lock()
         self.running: Placed | None = None
         self.previous: Placed | None = None
+        self.shadow: Placed | None = None
 
     def open(self, first: Placed) -> None:
         """Try the first model out and let it answer; raises whatever is wrong with it."""
@@ -83,6 +89,43 @@ class Models:
             self._publish(back.model)
             self.running, self.previous = back, before
         return back
+
+    def cast_shadow(self, folder: Path) -> Placed:
+        """Compare the bundle in `folder` with whichever runs, in the place of another one.
+
+        Raises:
+            BundleError, Conflict, Cancelled: As `swap`; nothing has changed.
+        """
+        with self._alone():
+            before = self._running()
+            found = self._tried(folder, before)
+            self.comparing.begin(found.model, apart=found is not before)
+            self.shadow = found
+        return found
+
+    def end_shadow(self) -> None:
+        """Unload the shadow, if there is one; raises Conflict when another call is under way."""
+        with self._alone():
+            self.comparing.end()
+            self.shadow = None
+
+    def promote(self) -> Placed:
+        """Let the shadow answer; the model before is kept for `rollback`.
+
+        Raises:
+            Conflict: There is none, it has lost workers, or another call is under way.
+            Cancelled: The service stops.
+        """
+        with self._alone():
+            before, found = self._running(), self.shadow
+            if found is None:
+                raise Conflict("expected a shadow to promote, got a service that has none: load it with shadow")
+            self.comparing.end(promoted=True)
+            self.shadow = None
+            if found is not before:
+                self._publish(found.model)
+                self.running, self.previous = found, before
+        return found
 
     def _running(self) -> Placed:
         if self.running is None:

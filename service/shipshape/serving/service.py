@@ -22,6 +22,8 @@ from shipshape.serving.models import Load, Models, Placed
 from shipshape.serving.operators import OperatorDoors
 from shipshape.serving.rest.app import build_app
 from shipshape.serving.rest.server import RestDoor
+from shipshape.serving.shadow import Shadow
+from shipshape.serving.shadow_metrics import ShadowMetrics
 from shipshape.serving.timing import Timeouts
 from shipshape.settings import Settings
 from shipshape.telemetry import Metrics, watch_workers
@@ -78,7 +80,9 @@ class Service:
         watch_workers(self.executor, metrics.registry)
         self._core = Core(self.executor, limits, on_age=metrics.observe_age)
         self.health = Health(self.executor)
-        self.models = Models(load, self._try_out, self._publish)
+        compared = ShadowMetrics(metrics.registry)
+        self._shadow = Shadow(self.executor, self._core, settings.shadow_share, compared)
+        self.models = Models(load, self._try_out, self._publish, self._shadow)
         access = load_access(settings, metrics.count_client_refusal)
         self._grpc = GrpcDoor(
             self._core,
@@ -138,6 +142,7 @@ class Service:
         """Not ready, refuse, accept no more, let what is under way end, for up to `drain_s` seconds."""
         answering = self.leave()
         self._core.close()
+        self._shadow.stop()
         if answering:
             time.sleep(LAST_CALL_S)
         end = time.monotonic() + self._settings.drain_s

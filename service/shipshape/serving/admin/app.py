@@ -33,6 +33,10 @@ def build_admin_app(control: Control, tokens: Tokens) -> ASGIApp:
         """Try the bundle in a folder out and let it answer; the one before is kept."""
         return control.swap(folder)
 
+    def shadow(folder: Annotated[str, Body(embed=True, description="Absolute, or below bundle_root.")]) -> Json:
+        """Try the bundle in a folder out and compare its answers with those of the running one."""
+        return control.shadow(folder)
+
     def add(path: str, handler: Any, method: str) -> None:
         """One path; its name in the contract is that of its handler."""
         app.add_api_route(path, handler, methods=[method], operation_id=handler.__name__)
@@ -40,6 +44,9 @@ def build_admin_app(control: Control, tokens: Tokens) -> ASGIApp:
     add("/admin/status", control.status, "GET")
     add("/admin/bundle", swap, "POST")
     add("/admin/rollback", control.rollback, "POST")
+    add("/admin/shadow", shadow, "POST")
+    add("/admin/unshadow", control.unshadow, "POST")
+    add("/admin/promote", control.promote, "POST")
     add("/admin/drain", control.drain, "POST")
     add("/admin/resume", control.resume, "POST")
     add_handlers(app)

@@ -10,6 +10,7 @@ from shipshape.errors import Conflict, InvalidInput
 from shipshape.executor import Executor
 from shipshape.serving.health import Health, State
 from shipshape.serving.models import Models, Placed
+from shipshape.serving.shadow_metrics import Verdict
 
 Json = dict[str, Any]
 
@@ -44,6 +45,7 @@ class Control:
             "uptime_s": round(time.monotonic() - self._start, 3),
             "bundle": _bundle(self._models.running),
             "previous": _bundle(self._models.previous),
+            "shadow": self._shadow(),
             "contacts": asdict(counts) | {"pending": counts.pending},
             "queue_depth": executor.queue_depth,
             "running": executor.running,
@@ -64,6 +66,21 @@ class Control:
         self._models.rollback()
         return self.status()
 
+    def shadow(self, folder: str) -> Json:
+        """Compare the bundle in `folder` with the running one; the folder and errors as of `swap`."""
+        self._models.cast_shadow(folder_below(self._root, folder))
+        return self.status()
+
+    def unshadow(self) -> Json:
+        """Unload the shadow; without one nothing changes. Raises Conflict as `Models.end_shadow`."""
+        self._models.end_shadow()
+        return self.status()
+
+    def promote(self) -> Json:
+        """Let the shadow answer; raises as `Models.promote`."""
+        self._models.promote()
+        return self.status()
+
     def drain(self) -> Json:
         """Not ready until `resume`, so that traffic moves away; what still comes is answered."""
         self._health.drain()
@@ -75,6 +92,12 @@ class Control:
             raise Conflict("expected a running service, got one that is stopping")
         self._health.resume()
         return self.status()
+
+    def _shadow(self) -> Json | None:
+        if (bundle := _bundle(self._models.shadow)) is None:
+            return None
+        counts = self._models.comparing.counts()
+        return bundle | {"compared": counts[Verdict.SAME] + counts[Verdict.DIFFERS]} | counts
 
 
 def folder_below(root: Path, given: str) -> Path:
