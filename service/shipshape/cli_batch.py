@@ -41,4 +41,6 @@ def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument("--ray", metavar="ADDRESS", help="of a Ray cluster, or `local`; needs shipshape[ray]")
     where.add_argument("--service", metavar="URL", help="of a running service, grpc://HOST:PORT: its batch lane")
     where.add_argument("--ca", type=Path, metavar="PEM", help="who signed the certificate of the service")
+    where.add_argument("--cert", type=Path, metavar="PEM", help="own certificate, for a service that asks for one")
+    where.add_argument("--key", type=Path, metavar="PEM", help="its key")
     where.add_argument("--token-file", type=Path, metavar="FILE", help="holds the bearer token for the service")

@@ -196,7 +196,7 @@ def test_folders_are_searched_and_a_folder_of_ros_2_is_one_input(tmp_path, engin
             ["--bundle", "nowhere"],
             "expected a bundle folder at nowhere, got nothing: --bundle or SHIPSHAPE_BUNDLE names another",
         ),
-        (["--service", "nowhere"], "expected --service like grpc://127.0.0.1:50051, got 'nowhere'"),
+        (["--service", "nowhere"], "expected an endpoint like grpc://127.0.0.1:50051, got 'nowhere'"),
         (["--compare", "nowhere"], "expected results of a finished run in nowhere, got no contacts.parquet"),
     ],
 )

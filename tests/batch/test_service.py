@@ -2,18 +2,17 @@
 
 from pathlib import Path
 
-import grpc
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from oip.real import MODELS, real
 from serving.fakes import cluster, running
-from shipshape.batch.service import PAUSE_S, Service, to_recognition
+from shipshape.batch.service import PAUSE_S, Service
 from shipshape.cli import main
-from shipshape.errors import SettingsError, ShipshapeError, TooLarge
+from shipshape.client import Endpoint, Lane, Refusal, Rung
+from shipshape.errors import NotReady, Overloaded, SettingsError, ShipshapeError, TooLarge
 from shipshape.types import Contact, Options
-from shipshape.v1 import shipshape_pb2 as pb
 from shipshape.validation import ContactLimits, check_contact
 
 __all__ = ["real"]
@@ -23,6 +22,10 @@ SCAN = Path(__file__).parents[2] / "examples" / "contacts.npz"
 
 def url_of(doors) -> str:
     return f"grpc://127.0.0.1:{doors.addresses.grpc_port}"
+
+
+def endpoint_of(doors) -> Endpoint:
+    return Endpoint(url_of(doors))
 
 
 def test_a_service_gives_the_same_rows(real, tmp_path):
@@ -37,7 +40,7 @@ def test_a_service_gives_the_same_rows(real, tmp_path):
 
 def test_what_a_service_refuses_is_told(tmp_path):
     with running() as doors:
-        answers = Service(url_of(doors)).answers_of(Options(), restored=False)
+        answers = Service(endpoint_of(doors)).answers_of(Options(), restored=False)
         first, second, third = answers([Contact(cluster()), Contact(cluster(3)), Contact(cluster(), "crash")])
     assert first.vessel == "tug"
     assert (first.measured_points, first.inferred_points) == (40, 40)
@@ -45,52 +48,46 @@ def test_what_a_service_refuses_is_told(tmp_path):
     assert "id" in third
 
 
+class Busy:
+    """A client whose service is busy at first, and then for the second contact alone."""
+
+    def __init__(self, answer):
+        self.answer, self.calls = answer, []
+
+    def scan(self, contacts, wishes):
+        self.calls.append((len(contacts), wishes.lane, wishes.lowest_rung))
+        if len(self.calls) == 1:
+            raise NotReady("expected a ready service, got one that is not")
+        results = [self.answer] * len(contacts)
+        if len(self.calls) == 2:
+            results[1] = Refusal("", Overloaded("expected room, got none"))
+        return results
+
+
 def test_it_waits_for_a_busy_service_and_asks_again():
-    calls, slept = [], []
-
-    class Busy(Exception):
-        def code(self):
-            return grpc.StatusCode.RESOURCE_EXHAUSTED
-
-    class BusyError(Busy, grpc.RpcError):
-        def trailing_metadata(self):
-            return [_Entry("grpc-retry-pushback-ms", "250")]
-
-    class Stub:
-        """Busy at first, then busy for the second contact."""
-
-        def RecogniseScan(self, request, timeout, metadata):
-            calls.append((len(request.contacts), request.options.lane, request.options.lowest_rung))
-            if len(calls) == 1:
-                raise BusyError
-            results = [pb.ContactResult(recognition=doors_answer) for _ in request.contacts]
-            if len(calls) == 2:
-                overloaded = pb.ContactError(kind=pb.ERROR_KIND_OVERLOADED, message="expected room, got none")
-                results[1] = pb.ContactResult(error=overloaded)
-            return pb.RecogniseScanResponse(results=results)
-
+    slept = []
     with running() as doors:
-        doors_answer = doors.ask_grpc(cluster())[0].recognition
-        service = Service(url_of(doors), sleep=slept.append)
-        service._stub = Stub()
+        service = Service(endpoint_of(doors), sleep=slept.append)
+        (answer,) = service.answers_of(Options(), restored=False)([Contact(cluster())])
+        service._client = busy = Busy(answer)
         answers = list(service.answers_of(Options(), restored=False)([Contact(cluster())] * 3))
     assert [answer.vessel for answer in answers] == ["tug"] * 3
-    assert calls == [
-        (3, pb.LANE_BATCH, pb.RUNG_FULL),
-        (3, pb.LANE_BATCH, pb.RUNG_FULL),
-        (1, pb.LANE_BATCH, pb.RUNG_FULL),
-    ]
-    assert slept == [0.25, PAUSE_S]
+    assert busy.calls == [(count, Lane.BATCH, Rung.FULL) for count in (3, 3, 1)]
+    assert slept == [PAUSE_S, PAUSE_S]
 
 
-class _Entry:
-    def __init__(self, key, value):
-        self.key, self.value = key, value
+def test_it_does_not_wait_for_ever(monkeypatch):
+    monkeypatch.setattr("shipshape.batch.service.PATIENCE_S", 0.0)
+    with running() as doors:
+        service = Service(endpoint_of(doors), sleep=lambda seconds: None)
+        service._client = Busy(None)
+        with pytest.raises(ShipshapeError, match="expected the service to take batch work within 0 s, got"):
+            list(service.answers_of(Options(), restored=False)([Contact(cluster())]))
 
 
 def test_messages_hold_no_more_than_the_service_takes():
     with running(max_contacts=2) as doors:
-        service = Service(url_of(doors))
+        service = Service(endpoint_of(doors))
         groups = list(service._groups([Contact(cluster())] * 5))
     assert [len(group) for group in groups] == [2, 2, 1]
 
@@ -99,7 +96,7 @@ def test_messages_hold_no_more_than_the_service_takes():
 def test_a_contact_that_is_too_large_is_refused_alone(points):
     asked = []
     with running() as doors:
-        service = Service(url_of(doors), sleep=asked.append)
+        service = Service(endpoint_of(doors), sleep=asked.append)
         large = Contact(np.ones((points, 3), np.float32))
         answers = list(service.answers_of(Options(), restored=False)([Contact(cluster()), large]))
     assert answers[0].vessel == "tug"
@@ -111,21 +108,21 @@ def test_a_contact_that_is_too_large_is_refused_alone(points):
 
 def test_another_bundle_than_at_first_ends_the_run():
     with running() as doors:
-        service = Service(url_of(doors))
+        service = Service(endpoint_of(doors))
         service.bundle = "0" * 64
-        with pytest.raises(ShipshapeError, match=r"expected answers of the service, got INVALID_ARGUMENT: .*bun"):
+        with pytest.raises(ShipshapeError, match=r"expected answers of the service, got: .*bun"):
             list(service.answers_of(Options(), restored=False)([Contact(cluster())]))
 
 
 def test_nobody_there_is_told():
-    with pytest.raises(SettingsError, match=r"expected shipshape\.v1 at grpc://127\.0\.0\.1:1, got UNAVAILABLE"):
-        Service("grpc://127.0.0.1:1")
+    with pytest.raises(
+        SettingsError, match=r"expected shipshape\.v1 at grpc://127\.0\.0\.1:1, got: expected a ser"
+    ):
+        Service(Endpoint("grpc://127.0.0.1:1"))
 
 
-def test_a_recognition_without_its_cloud_still_counts_its_points():
-    message = pb.Recognition(
-        vessel="tug", rung="full", preset=pb.PRESET_BEST, measured_points=3, inferred_points=2
-    )
-    said = to_recognition(message)
-    assert (said.measured_points, said.inferred_points, said.image_method) == (3, 2, None)
-    assert said.restored.points_level.dtype == np.float32
+def test_ids_that_a_service_would_not_take_are_cut():
+    with running() as doors:
+        answers = Service(endpoint_of(doors)).answers_of(Options(), restored=False)
+        (answer,) = answers([Contact(cluster(), "x" * 300)])
+    assert answer.contact_id == "x" * 256

@@ -132,6 +132,16 @@ def test_a_satellite_link_sends_int16_and_gets_the_answer_to_that(doors):
     assert small < 0.7 * plain
 
 
+def test_what_each_endpoint_runs_and_takes_is_told(doors):
+    here, gone = f"grpc://127.0.0.1:{doors.addresses.grpc_port}", "grpc://127.0.0.1:1"
+    with Client(here, gone) as client:
+        told = client.info()
+    limits = doors.stub.GetModelInfo(pb.GetModelInfoRequest()).limits
+    assert told[here].bundle_name == doors.stub.GetModelInfo(pb.GetModelInfoRequest()).bundle_name
+    assert (told[here].max_points, told[here].max_contacts) == (limits.max_points, limits.max_contacts)
+    assert isinstance(told[gone], Unreachable)
+
+
 def test_capacity_and_status_are_told_by_endpoint(doors):
     nobody = gone()
     with Client(url_of(doors), nobody) as client:

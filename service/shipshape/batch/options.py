@@ -8,11 +8,11 @@ from pathlib import Path
 from shipshape.batch.engines import Engine, LocalEngine, ServiceEngine
 from shipshape.batch.method import Method, Segmentation
 from shipshape.batch.service import Service
+from shipshape.client import Endpoint
 from shipshape.errors import SettingsError
 from shipshape.executor import usable_cores
 from shipshape.pointfiles.clusters import ID_NAMES
 from shipshape.settings import load_settings
-from shipshape.token_file import read_token
 from shipshape.types import ImageMethod, Preset
 
 
@@ -49,8 +49,8 @@ def engine_of(arguments: argparse.Namespace, method: Method) -> Engine:
     if arguments.service and arguments.ray:
         raise SettingsError("expected --service or --ray, got both")
     if arguments.service:
-        token = "" if arguments.token_file is None else read_token(arguments.token_file)
-        return ServiceEngine(Service(arguments.service, arguments.ca, token))
+        own = {"ca": arguments.ca, "certificate": arguments.cert, "key": arguments.key}
+        return ServiceEngine(Service(Endpoint(arguments.service, **own, token_file=arguments.token_file)))
     folder = arguments.bundle or load_settings().bundle
     if arguments.ray:
         return _ray_engine(arguments.ray, folder)

@@ -12,13 +12,14 @@ from shipshape.batch import rows
 from shipshape.batch.method import Method
 from shipshape.batch.segmentation import segment
 from shipshape.batch.units import Chunk, Cloud, Part
+from shipshape.client import Answer
 from shipshape.errors import BundleError, InvalidInput
 from shipshape.pipeline import Pipeline
 from shipshape.sample import sample_contact
 from shipshape.types import Contact, Options, Recognition
 
-Answer = Recognition | str  # a string says why there is no recognition
-AnswerAll = Callable[[Sequence[Contact]], Iterator[Answer]]
+Answered = Recognition | Answer | str  # by this machine, by a service; a string says why there is no answer
+AnswerAll = Callable[[Sequence[Contact]], Iterator[Answered]]
 
 log = logging.getLogger(__name__)
 
@@ -41,8 +42,8 @@ class Recogniser:
         for cloud, contact in contacts:
             answer = cloud.error or next(answers)
             table.append(rows.row_of(chunk, cloud, contact.sensor_height, answer))
-            if self.method.restored and isinstance(answer, Recognition):
-                clouds.append(rows.cloud_of(table[-1]["unit"], answer))
+            if self.method.restored and not isinstance(answer, str) and answer.restored is not None:
+                clouds.append(rows.cloud_of(table[-1]["unit"], answer.restored))
         of_all = {"bundle": self.bundle, "code": self.code}
         return Part(
             sha256=chunk.sha256,
@@ -58,7 +59,7 @@ class Recogniser:
 def answers_of(pipeline: Pipeline, options: Options) -> AnswerAll:
     """The answers of a pipeline in this process."""
 
-    def answer(contact: Contact) -> Answer:
+    def answer(contact: Contact) -> Answered:
         """One contact; a fault of the product is told in its row, and with all that is known in the log."""
         try:
             return pipeline.run(contact, options)

@@ -9,7 +9,8 @@ from typing import Any
 import pyarrow as pa
 
 from shipshape.batch.units import Chunk, Cloud, unit_id
-from shipshape.types import Recognition
+from shipshape.client import Answer
+from shipshape.types import Recognition, RestoredCloud
 
 VERSION = "1"
 
@@ -67,7 +68,9 @@ CLOUDS = pa.schema(
 )
 
 
-def row_of(chunk: Chunk, cloud: Cloud, sensor_height: float | None, answer: Recognition | str) -> dict[str, Any]:
+def row_of(
+    chunk: Chunk, cloud: Cloud, sensor_height: float | None, answer: Recognition | Answer | str
+) -> dict[str, Any]:
     """A row but for `bundle` and `code`; `answer` is what was recognised, or why it was refused."""
     about = {
         "unit": unit_id(chunk.sha256, cloud.message, cloud.cluster),
@@ -84,13 +87,13 @@ def row_of(chunk: Chunk, cloud: Cloud, sensor_height: float | None, answer: Reco
     return about | ({"error": answer} if isinstance(answer, str) else _answered(answer))
 
 
-def cloud_of(unit: str, recognition: Recognition) -> dict[str, Any]:
+def cloud_of(unit: str, restored: RestoredCloud) -> dict[str, Any]:
     """A row of the restored clouds."""
-    x, y, z = recognition.restored.points_level.T
-    return {"unit": unit, "x": x, "y": y, "z": z, "measured": recognition.restored.measured}
+    x, y, z = restored.points_level.T
+    return {"unit": unit, "x": x, "y": y, "z": z, "measured": restored.measured}
 
 
-def _answered(recognition: Recognition) -> dict[str, Any]:
+def _answered(recognition: Recognition | Answer) -> dict[str, Any]:
     box = recognition.box
     x, y, z = box.center_level
     return {

@@ -10,7 +10,7 @@
 """
 
 from shipshape.client.aio import AsyncClient
-from shipshape.client.answers import Answer, Capacity, EndpointStatus, Refusal, ScanAnswer
+from shipshape.client.answers import Answer, Capacity, EndpointStatus, Info, Refusal, ScanAnswer
 from shipshape.client.endpoint import Endpoint
 from shipshape.client.links import LAN, SATELLITE, Link
 from shipshape.client.sync import Client
@@ -29,6 +29,7 @@ __all__ = [
     "Endpoint",
     "EndpointStatus",
     "ImageMethod",
+    "Info",
     "Lane",
     "Link",
     "Preset",

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
 
-from shipshape.client.answers import Answer, Capacity, EndpointStatus, Refusal, ScanAnswer
+from shipshape.client.answers import Answer, Capacity, EndpointStatus, Info, Refusal, ScanAnswer
 from shipshape.client.attempts import Attempts
 from shipshape.client.calls import Calls
 from shipshape.client.endpoint import Endpoint, as_endpoint
@@ -155,17 +155,11 @@ class AsyncClient:
         self, points: int = 300, lane: Lane = Lane.TRACKING, *, timeout_s: float | None = None
     ) -> dict[str, Capacity | ShipshapeError]:
         """What each endpoint would promise a contact of so many points now, or why it says nothing; by its URL."""
+        return await self._of_each(lambda calls: calls.capacity(points, lane, self._limit(timeout_s)))
 
-        async def ask(calls: Calls) -> Capacity | ShipshapeError:
-            """One endpoint."""
-            try:
-                return await calls.capacity(points, lane, self._limit(timeout_s))
-            except ShipshapeError as error:
-                return error
-
-        opened = self._opened().values()
-        told = await asyncio.gather(*map(ask, opened))
-        return {calls.endpoint.url: each for calls, each in zip(opened, told, strict=True)}
+    async def info(self, *, timeout_s: float | None = None) -> dict[str, Info | ShipshapeError]:
+        """What each endpoint runs and takes, or why it says nothing; by its URL."""
+        return await self._of_each(lambda calls: calls.info(self._limit(timeout_s)))
 
     def status(self) -> list[EndpointStatus]:
         """What is known of each endpoint, in their order; asks nobody."""
@@ -209,6 +203,17 @@ class AsyncClient:
             with contextlib.suppress(*RETRYABLE, DeadlineExceeded):
                 return await attempts.run()
         return await within(deadline, compute(local))
+
+    async def _of_each(self, ask: Callable[[Calls], Awaitable[T]]) -> dict[str, T | ShipshapeError]:
+        async def told(calls: Calls) -> T | ShipshapeError:
+            try:
+                return await ask(calls)
+            except ShipshapeError as error:
+                return error
+
+        opened = self._opened().values()
+        every = await asyncio.gather(*map(told, opened))
+        return {calls.endpoint.url: each for calls, each in zip(opened, every, strict=True)}
 
     async def _watch(self, calls: Calls) -> None:
         while True:

@@ -73,6 +73,18 @@ class Capacity:
 
 
 @dataclass(frozen=True, slots=True)
+class Info:
+    """What a service runs, and what it takes."""
+
+    version: str  # of the service
+    bundle: str  # digest
+    bundle_name: str
+    max_points: int  # of a contact
+    max_contacts: int  # of a scan
+    max_body_bytes: int  # of a request
+
+
+@dataclass(frozen=True, slots=True)
 class EndpointStatus:
     """What a client knows of one endpoint."""
 

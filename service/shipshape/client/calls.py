@@ -6,10 +6,10 @@ from typing import Any
 import grpc
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
-from shipshape.client.answers import Answer, Capacity, Refusal
+from shipshape.client.answers import Answer, Capacity, Info, Refusal
 from shipshape.client.endpoint import Endpoint
 from shipshape.client.failures import error_of, value_of
-from shipshape.client.messages import from_contact, from_wishes, to_answer, to_capacity, to_results
+from shipshape.client.messages import from_contact, from_wishes, to_answer, to_capacity, to_info, to_results
 from shipshape.client.route import Route
 from shipshape.client.wishes import Wishes
 from shipshape.errors import NotReady, ServiceFault
@@ -63,6 +63,11 @@ class Calls:
         capacity = to_capacity(response)
         self.route.told_capacity(capacity, took_s)
         return capacity
+
+    async def info(self, timeout_s: float) -> Info:
+        """What it runs, and what it takes; raises ShipshapeError."""
+        response, _, _ = await self._call(self.stub.GetModelInfo, pb.GetModelInfoRequest(), timeout_s)
+        return to_info(response)
 
     async def probe(self, timeout_s: float) -> None:
         """Ask for health, then for capacity, whose time is a round trip on a connection that stands.

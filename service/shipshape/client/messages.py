@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipshape.client.answers import Answer, Capacity, Refusal
+from shipshape.client.answers import Answer, Capacity, Info, Refusal
 from shipshape.client.failures import error_of_contact
 from shipshape.client.wishes import Wishes
 from shipshape.errors import InvalidInput
@@ -116,6 +116,19 @@ def to_capacity(message: pb.GetCapacityResponse) -> Capacity:
         workers=message.workers,
         budget_s=message.budget.budget_ms / 1e3,
         level=message.budget.level,
+    )
+
+
+def to_info(message: pb.GetModelInfoResponse) -> Info:
+    """What a service runs, and what it takes."""
+    limits = message.limits
+    return Info(
+        message.version,
+        message.bundle,
+        message.bundle_name,
+        limits.max_points,
+        limits.max_contacts,
+        limits.max_body_bytes,
     )
 
 

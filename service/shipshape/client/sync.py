@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from shipshape.client.aio import WINDOW, AsyncClient
-from shipshape.client.answers import Answer, Capacity, EndpointStatus, Refusal, ScanAnswer
+from shipshape.client.answers import Answer, Capacity, EndpointStatus, Info, Refusal, ScanAnswer
 from shipshape.client.endpoint import Endpoint
 from shipshape.client.wishes import Wishes
 from shipshape.errors import ShipshapeError
@@ -77,6 +77,10 @@ class Client:
     ) -> dict[str, Capacity | ShipshapeError]:
         """What each endpoint would promise now, or why it says nothing; by its URL."""
         return _wait(self._client.capacity(points, lane, timeout_s=timeout_s))
+
+    def info(self, *, timeout_s: float | None = None) -> dict[str, Info | ShipshapeError]:
+        """What each endpoint runs and takes, or why it says nothing; by its URL."""
+        return _wait(self._client.info(timeout_s=timeout_s))
 
     def status(self) -> list[EndpointStatus]:
         """What is known of each endpoint, in their order; asks nobody."""
