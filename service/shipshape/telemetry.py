@@ -22,6 +22,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Info
 from shipshape import tracing
 from shipshape.budget import WINDOWS, Budget, Level
 from shipshape.histogram import BulkHistogram
+from shipshape.processes import Processes
 
 # Seconds, but those of requests: shares of the budget.
 STAGE_BUCKETS = (5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3, 12.8e-3, 25e-3, 50e-3, 0.1, 0.4, 1.6)
@@ -112,6 +113,7 @@ class Metrics:
         watch_budget(budget, registry)
         self._bundle = Info("shipshape_bundle", "The running model bundle.", registry=registry)
         ProcessCollector(registry=registry)
+        registry.register(Processes())
 
     def count_contacts(self, door: str, outcomes: Iterable[str]) -> None:
         """Contacts of a scan were answered ("ok") or refused (the kind of the error)."""
