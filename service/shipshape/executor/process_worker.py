@@ -21,7 +21,7 @@ from shipshape.executor.worker import Worker
 # For a report to be sent with the next, while there is more work: to be woken for each would cost the service, and
 # the worker on the same core, more than all that it then does.
 HOLD_S = 0.008
-HOLD_SHARE = 0.25  # and no more of the time that is left until the deadline
+HOLD_SHARE = 0.5  # at most, of the time that the work at hand will take, and of that until the deadline
 NICE = 5  # on a busy core the doors go first: refusals are soon given, and answers soon sent
 LEARNED = 4  # one in so many entries is learned from: costs change slowly, and learning takes time
 
@@ -127,7 +127,8 @@ class SocketMailbox:
         error = entry.ticket.future.exception()
         result = entry.ticket.future.result() if error is None else as_message(error)
         urgent = entry.task.lane is Lane.COLLISION
-        hold = 0.0 if urgent else min(HOLD_S, HOLD_SHARE * (entry.task.deadline - now))
+        here = sum(other.left for other in self._entries.values())
+        hold = 0.0 if urgent else min(HOLD_S, HOLD_SHARE * min(here, entry.task.deadline - now))
         self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, took), now + hold)
 
     def _tell(self, report: Report, send_at: float = 0.0) -> None:
