@@ -190,6 +190,8 @@ class Live:
             internal: Internal errors that the fault is meant to be, each of which the log must tell; None: any.
             grows_mb: Memory that it may hold on to.
         """
+        self.answers_good_requests()  # so that the connections of these clients count before as they do afterwards
+        eventually(self._idle)
         counted, held, told = self.counts(), self.footprint(), len(self.internal_errors())
         assert counted.pending == 0
         yield
