@@ -130,7 +130,7 @@ class Core:
         self._model = None
 
     def deadline_in(self, seconds: float) -> float:
-        """When an answer has to be there that its caller wants in `seconds`, as `submit` and `submit_scan` take it."""
+        """When an answer must be there that its caller wants in `seconds`; `submit` and `submit_scan` take it."""
         return self._executor.clock() + seconds - WAY_OUT_S
 
     def seconds_until(self, deadline: float) -> float:
