@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import httpx
+import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from serving.fakes import DIGEST, PATIENCE, FakePipeline, cluster, fake_model, running, until
@@ -114,3 +115,18 @@ def compared(service, **expected):
 def counts(service):
     shadow = service.shadow()
     return {verdict: shadow[verdict] for verdict in ("same", "differs", "failed", "dropped")}
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    with administered(tmp_path_factory.mktemp("shadow")) as service:
+        yield service
+
+
+@pytest.fixture
+def service(shared):
+    """One service for most tests; each finds it without a shadow."""
+    yield shared
+    for pipeline in shared.loaded.values():
+        pipeline.proceed.set()
+    shared.call("unshadow")

@@ -10,27 +10,14 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from serving.fakes import DIGEST, PATIENCE, cluster
-from serving.shadowed import OTHER, administered, compared
+from serving.shadowed import OTHER, administered, compared, service, shared
 from shipshape.executor import Ticket
 from shipshape.serving import shadow as module
 from shipshape.serving.model import Reply
 from shipshape.telemetry import JsonLines
 from shipshape.types import Rung
 
-
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory):
-    with administered(tmp_path_factory.mktemp("shadow")) as service:
-        yield service
-
-
-@pytest.fixture
-def service(shared):
-    """One service for most tests; each finds it without a shadow."""
-    yield shared
-    for pipeline in shared.loaded.values():
-        pipeline.proceed.set()
-    shared.call("unshadow")
+__all__ = ["service", "shared"]
 
 
 def test_the_same_bundle_says_the_same(service):

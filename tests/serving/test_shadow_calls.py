@@ -9,24 +9,11 @@ import httpx
 import pytest
 
 from serving.fakes import DIGEST, PATIENCE, FakePipeline, fake_model
-from serving.shadowed import OTHER, TOKEN, administered, compared
+from serving.shadowed import OTHER, TOKEN, administered, compared, service, shared
 from shipshape.cli import main
 from shipshape.errors import Cancelled, Conflict
 
-
-@pytest.fixture(scope="module")
-def shared(tmp_path_factory):
-    with administered(tmp_path_factory.mktemp("shadow")) as service:
-        yield service
-
-
-@pytest.fixture
-def service(shared):
-    """One service for most tests; each finds it without a shadow."""
-    yield shared
-    for pipeline in shared.loaded.values():
-        pipeline.proceed.set()
-    shared.call("unshadow")
+__all__ = ["service", "shared"]
 
 
 def test_a_bad_one_is_refused_and_changes_nothing(service):
