@@ -206,6 +206,7 @@ class AsyncClient:
 
     async def _of_each(self, ask: Callable[[Calls], Awaitable[T]]) -> dict[str, T | ShipshapeError]:
         async def told(calls: Calls) -> T | ShipshapeError:
+            """What one endpoint says, or why it says nothing."""
             try:
                 return await ask(calls)
             except ShipshapeError as error:
