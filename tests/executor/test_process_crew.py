@@ -182,9 +182,9 @@ def test_urgent_work_overtakes_between_two_stages(executor, crew):
         ticket.future.add_done_callback(lambda _: ended.append("batch"))
     urgent = executor.submit(task(crew, lane=Lane.COLLISION))
     urgent.future.add_done_callback(lambda _: ended.append("urgent"))
-    urgent.result()
     # The other worker may be quicker with its own; the one that turned to the urgent task had not reached the end.
-    assert ended in (["urgent"], ["batch", "urgent"])
+    until(lambda: len(ended) == 5)
+    assert ended.index("urgent") <= 1, ended
     assert all(ticket.result()["seen"] == ["first", "second"] for ticket in batch), "no stage ran twice"
 
 
