@@ -66,9 +66,14 @@ class Pipeline:
         self._thresholds = bundle.parameters.get("reasons", {})
         radius = self._common["spd2_radius"]
         self.stages = _stages(lambda work: methods[work.options.preset], radius)
-        self._ladders = {
+        ladders = {
             Preset.PAPER: (RungStages(Rung.FULL, _stages(lambda work: paper, radius)),),
             Preset.BEST: _ladder(best, _stages(lambda work: best, radius)),
+        }
+        self._ladders = {
+            (preset, lowest): tuple(rung for rung in ladder if Options(lowest_rung=lowest).accepts(rung.name))
+            for preset, ladder in ladders.items()
+            for lowest in Rung
         }
 
     def run(self, contact: Contact, options: Options | None = None) -> Recognition:
@@ -99,7 +104,7 @@ class Pipeline:
 
     def ladder(self, options: Options) -> tuple[RungStages, ...]:
         """The rungs a contact may be computed on, the best first, down to the lowest that the caller accepts."""
-        return tuple(rung for rung in self._ladders[options.preset] if options.accepts(rung.name))
+        return self._ladders[options.preset, options.lowest_rung]
 
     def finish(
         self, work: Work, stage_ms: Mapping[str, float], rung: Rung = Rung.FULL, rung_reason: str = ""

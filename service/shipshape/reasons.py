@@ -12,7 +12,6 @@ out_of_catalogue  the answer is "unknown"; its threshold is `common.unknown_abov
 without a threshold never gives that code. Preset `paper` is held to the same thresholds.
 """
 
-import statistics
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -60,7 +59,6 @@ def reasons_of(found: Measures, *, unknown: bool, thresholds: Mapping[str, int |
 # Wide enough that an empty column means something; these three were compared by ROC on the validation set.
 _POINTS_A_COLUMN = 6
 _FEWEST_COLUMNS, _MOST_COLUMNS = 4, 24
-_LEAST_HEIGHT = np.float32(0.01)  # m, of a column that holds anything
 
 
 def missing_share(restored: RestoredCloud, bearing: float, waterline: float) -> float:
@@ -76,11 +74,5 @@ def missing_share(restored: RestoredCloud, bearing: float, waterline: float) -> 
         waterline: z of the water in the level frame, m.
     """
     count = min(max(int(np.count_nonzero(restored.measured)) // _POINTS_A_COLUMN, _FEWEST_COLUMNS), _MOST_COLUMNS)
-    top, measured = kernels.silhouette(restored.points_level, restored.measured, bearing, count)
-    if not measured.any():  # preset paper: the whole cluster may lie outside its image
-        return 1.0
-    height = np.where(np.isfinite(top), np.maximum(top - np.float32(waterline), _LEAST_HEIGHT), 0.0)
-    density = measured / np.maximum(height, _LEAST_HEIGHT)
-    usual = statistics.median(density[measured > 0].tolist())  # of a few dozen: numpy takes ten times as long
-    lack = np.maximum(1.0 - density / usual, 0.0)
-    return float((lack * height).sum() / height.sum())
+    # Preset paper: the whole cluster may lie outside its image, and then all is missing.
+    return float(kernels.missing_share(restored.points_level, restored.measured, bearing, float(waterline), count))

@@ -21,6 +21,7 @@ class Entry:
     __slots__ = (
         "_ahead",
         "_place",
+        "_stages",
         "_why",
         "began",
         "hand",
@@ -44,6 +45,7 @@ class Entry:
         self.stage_ms: dict[str, float] = {}
         self._ahead: list[float] = []  # seconds expected of each stage ahead and of `finish`
         self._place = 0
+        self._stages = task.ladder[0].stages
         self._why = ""
 
     @property
@@ -65,12 +67,12 @@ class Entry:
     def stage(self) -> Stage[Any] | None:
         """The next one; None when all have run."""
         done = len(self.stage_ms)
-        stages = self.rung.stages
-        return stages[done] if done < len(stages) else None
+        return self._stages[done] if done < len(self._stages) else None
 
     def move_to(self, place: int, costs: Costs, why: str = "") -> None:
         """Go on with the rung at this place of the ladder, the last one if it has fewer."""
         self._place = min(place, len(self.task.ladder) - 1)
+        self._stages = self.rung.stages
         self._why = why if self._place else ""
         self._ahead = self._costs_of(self.rung, costs)
         self.left = sum(self._ahead)

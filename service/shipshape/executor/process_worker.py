@@ -93,7 +93,7 @@ class SocketMailbox:
         self._free = 0.0  # when the last one ended
         self._reports: list[bytes] = []  # that are not sent yet
         self._send_at = 0.0
-        self._entries: dict[int, Entry] = {}
+        self._numbers: dict[Entry, int] = {}  # of those that have not ended
         self._poll = select.poll()
         self._poll.register(connection, select.POLLIN)
 
@@ -114,8 +114,7 @@ class SocketMailbox:
 
     def ended(self, entry: Entry) -> None:
         """As `Mailbox.ended`; the service learns the cost of a whole rung, this end that of its stages."""
-        number = next(number for number, other in self._entries.items() if other is entry)
-        del self._entries[number]
+        number = self._numbers.pop(entry)
         now = time.monotonic()
         # Not the sum of its stages: what lies between them takes the worker's time as well.
         took = now - max(self._free, now if entry.began is None else entry.began)
@@ -127,7 +126,7 @@ class SocketMailbox:
         error = entry.ticket.future.exception()
         result = entry.ticket.future.result() if error is None else as_message(error)
         urgent = entry.task.lane is Lane.COLLISION
-        here = sum(other.left for other in self._entries.values())
+        here = sum(other.left for other in self._numbers)
         hold = 0.0 if urgent else min(HOLD_S, HOLD_SHARE * min(here, entry.task.deadline - now))
         self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, took), now + hold)
 
@@ -139,7 +138,7 @@ class SocketMailbox:
             message = packed(tuple(Report(report.number, as_message(error))))
         self._send_at = min(self._send_at, send_at) if self._reports else send_at
         self._reports.append(message)
-        if not self._entries or self._send_at <= time.monotonic():
+        if not self._numbers or self._send_at <= time.monotonic():
             self._send()
 
     def _send(self) -> None:
@@ -149,8 +148,9 @@ class SocketMailbox:
 
     def _taken(self, number: int, *given: Any) -> Entry | None:
         if not given:  # taken back
-            if number in self._entries:
-                self._entries[number].ticket.cancel()
+            for entry, other in self._numbers.items():
+                if other == number:
+                    entry.ticket.cancel()
             return None
         order, deadline, place, why = given
         try:
@@ -159,5 +159,5 @@ class SocketMailbox:
             self._tell(Report(number, as_message(error)))
             return None
         entry.move_to(place, self._prepared.costs, why)
-        self._entries[number] = entry
+        self._numbers[entry] = number
         return entry

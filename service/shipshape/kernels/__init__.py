@@ -8,7 +8,7 @@ from shipshape.kernels.clouds import Extent, extent, into_frame, out_of_frame
 from shipshape.kernels.groups import describe_groups, farthest_points, in_ball
 from shipshape.kernels.images import grey_levels, lift_columns, rasterise, stack_planes
 from shipshape.kernels.neighbours import count_neighbours, select_spread
-from shipshape.kernels.silhouette import silhouette
+from shipshape.kernels.silhouette import missing_share
 from shipshape.kernels.sphere import bin_spherically
 
 __all__ = [
@@ -22,9 +22,9 @@ __all__ = [
     "in_ball",
     "into_frame",
     "lift_columns",
+    "missing_share",
     "out_of_frame",
     "rasterise",
     "select_spread",
-    "silhouette",
     "stack_planes",
 ]
