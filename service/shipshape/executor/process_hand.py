@@ -13,8 +13,8 @@ from shipshape.executor.entry import Entry
 from shipshape.executor.lanes import Lane, Queues
 from shipshape.executor.messages import Inbox, packed
 
-SOON_S = 0.012  # of work before it, at which an entry is given to a worker that is busy: it need not wait for us
-MOST = 6  # entries that it is given at a time
+SOON_S = 0.030  # of work before it, at which an entry is given to a worker that is busy: it need not wait for us
+MOST = 12  # entries that it is given at a time
 
 
 class ProcessHand(Hand):

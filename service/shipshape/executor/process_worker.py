@@ -20,8 +20,8 @@ from shipshape.executor.worker import Worker
 
 # For a report to be sent with the next, while there is more work: to be woken for each would cost the service, and
 # the worker on the same core, more than all that it then does.
-HOLD_S = 0.008
-HOLD_SHARE = 0.5  # at most, of the time that the work at hand will take, and of that until the deadline
+HOLD_S = 0.020
+HOLD_OF_WORK, HOLD_OF_SLACK = 0.5, 0.25  # at most, of the time that the work at hand will take; until the deadline
 NICE = 5  # on a busy core the doors go first: refusals are soon given, and answers soon sent
 LEARNED = 4  # one in so many entries is learned from: costs change slowly, and learning takes time
 
@@ -127,7 +127,7 @@ class SocketMailbox:
         result = entry.ticket.future.result() if error is None else as_message(error)
         urgent = entry.task.lane is Lane.COLLISION
         here = sum(other.left for other in self._numbers)
-        hold = 0.0 if urgent else min(HOLD_S, HOLD_SHARE * min(here, entry.task.deadline - now))
+        hold = 0.0 if urgent else min(HOLD_S, HOLD_OF_WORK * here, HOLD_OF_SLACK * (entry.task.deadline - now))
         self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, took), now + hold)
 
     def _tell(self, report: Report, send_at: float = 0.0) -> None:
