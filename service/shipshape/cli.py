@@ -59,6 +59,7 @@ targets:
   grpc[s]+stream://HOST:PORT      shipshape.v1, a message of RecogniseStream a request
   http[s]://HOST:PORT             REST
   oip+http[s]://HOST:PORT/MODEL   Open Inference Protocol v2: any server that takes `points` and `counts`
+  oip+grpc[s]://HOST:PORT/MODEL   the same over gRPC
 
 exit codes: 0 the budget was held, 1 it was not, 2 wrong command or no target, 3 the tool was too slow to tell
 times are written as 50ms, 2s or 1m

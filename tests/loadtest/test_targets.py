@@ -24,6 +24,7 @@ from shipshape.v1 import shipshape_pb2 as pb
 
 PATIENCE_S = 10.0
 DOORS = ("grpc", "stream", "rest")
+ALL_DOORS = (*DOORS, "oip_rest", "oip_grpc")
 ONE, THREE = Request((cluster(),)), Request((cluster(40), cluster(60), cluster(10)))
 
 
@@ -36,13 +37,15 @@ def address(url, **keys):
     return parse_address(url, Keys(**keys), connections=2)
 
 
-def both(doors):
+def urls(doors):
     ports = doors.addresses
-    host = f"127.0.0.1:{ports.grpc_port}"
+    grpc, rest = f"127.0.0.1:{ports.grpc_port}", f"127.0.0.1:{ports.rest_port}"
     return {
-        "grpc": f"grpc://{host}",
-        "stream": f"grpc+stream://{host}",
-        "rest": f"http://127.0.0.1:{ports.rest_port}",
+        "grpc": f"grpc://{grpc}",
+        "stream": f"grpc+stream://{grpc}",
+        "rest": f"http://{rest}",
+        "oip_rest": f"oip+http://{rest}/shipshape",
+        "oip_grpc": f"oip+grpc://{grpc}/shipshape",
     }
 
 
@@ -64,7 +67,7 @@ async def asked(url, *requests, deadline_s=PATIENCE_S):
 @pytest.mark.parametrize("door", DOORS)
 def test_what_the_service_says_of_itself(doors, door):
     async def described():
-        async with opened(both(doors)[door]) as (_, info):
+        async with opened(urls(doors)[door]) as (_, info):
             return info
 
     info = run(described())
@@ -72,10 +75,10 @@ def test_what_the_service_says_of_itself(doors, door):
     assert info.version
 
 
-@pytest.mark.parametrize("door", DOORS)
+@pytest.mark.parametrize("door", ALL_DOORS)
 def test_single_contacts_and_scans_are_answered(doors, door):
     doors.pipeline.computed.clear()
-    replies = run(asked(both(doors)[door], ONE, THREE, ONE))
+    replies = run(asked(urls(doors)[door], ONE, THREE, ONE))
     assert [reply.outcome for reply in replies] == [Outcome.OK] * 3
     assert len(doors.pipeline.computed) == 5
 
@@ -83,8 +86,8 @@ def test_single_contacts_and_scans_are_answered(doors, door):
 @pytest.mark.parametrize("clusters", [ONE.clusters, THREE.clusters], ids=["one", "scan"])
 def test_lanes_go_along(doors, clusters):
     request = Request(clusters, "batch")
-    for url in both(doors).values():
-        assert [reply.outcome for reply in run(asked(url, request))] == [Outcome.OK]
+    for door in DOORS:
+        assert [reply.outcome for reply in run(asked(urls(doors)[door], request))] == [Outcome.OK]
     message = GrpcTarget(address("grpc://127.0.0.1:1")).encode(request).message
     kind = pb.RecogniseRequest if len(clusters) == 1 else pb.RecogniseScanRequest
     assert kind.FromString(message).options.lane == pb.LANE_BATCH
@@ -92,22 +95,22 @@ def test_lanes_go_along(doors, clusters):
     assert path == "/v1/recognise?lane=batch" if len(clusters) == 1 else json.loads(body)["lane"] == "batch"
 
 
-@pytest.mark.parametrize("door", DOORS)
+@pytest.mark.parametrize("door", ALL_DOORS)
 @pytest.mark.parametrize("bad", [Request((CLUSTER[:1],)), Request((cluster(), CLUSTER[:1]))], ids=["one", "scan"])
 def test_a_contact_that_is_refused_for_good_is_an_error_with_its_words(doors, door, bad):
-    (reply,) = run(asked(both(doors)[door], bad))
+    (reply,) = run(asked(urls(doors)[door], bad))
     assert reply.outcome is Outcome.ERROR
     assert "expected" in reply.detail
 
 
-@pytest.mark.parametrize("door", DOORS)
+@pytest.mark.parametrize("door", ALL_DOORS)
 def test_a_full_queue_refuses_and_a_deadline_expires(door):
     with running(queue_limit=2, max_contacts=2) as doors:
         held = doors.stub.Recognise.future(request(cluster(), contact_id="hold"), timeout=PATIENCE_S)
         assert doors.pipeline.entered.acquire(timeout=PATIENCE_S)
 
         async def crowded():
-            async with opened(both(doors)[door]) as (target, _):
+            async with opened(urls(doors)[door]) as (target, _):
                 (late,) = await asyncio.gather(target.send(target.encode(ONE), 0.05))
                 pair = Request((cluster(), cluster()))
                 waiting = asyncio.create_task(target.send(target.encode(pair), PATIENCE_S))
@@ -124,17 +127,17 @@ def test_a_full_queue_refuses_and_a_deadline_expires(door):
     assert waited.outcome is Outcome.OK
 
 
-@pytest.mark.parametrize("door", DOORS)
+@pytest.mark.parametrize("door", ALL_DOORS)
 def test_a_service_that_leaves_is_unavailable_and_one_that_starts_cannot_be_tested(door):
     async def left(doors):
-        async with opened(both(doors)[door]) as (target, _):
+        async with opened(urls(doors)[door]) as (target, _):
             await asyncio.to_thread(doors.service.stop)
             return await target.send(target.encode(ONE), PATIENCE_S)
 
     with running() as doors:
         assert run(left(doors)).outcome is Outcome.UNAVAILABLE
     with running(opened=False) as doors, pytest.raises(TargetError, match=r"^expected .* got .*(503|UNAVAILABLE)"):
-        run(asked(both(doors)[door]))
+        run(asked(urls(doors)[door]))
 
 
 def scan(error):
@@ -236,7 +239,9 @@ def test_a_server_of_something_else_cannot_be_tested():
         run(ask())
 
 
-@pytest.mark.parametrize("url", ["grpc://127.0.0.1:1", "http://127.0.0.1:1", "oip+http://127.0.0.1:1/m"])
+@pytest.mark.parametrize(
+    "url", ["grpc://127.0.0.1:1", "http://127.0.0.1:1", "oip+http://127.0.0.1:1/m", "oip+grpc://127.0.0.1:1/m"]
+)
 def test_a_port_where_nobody_listens_cannot_be_tested(url):
     with pytest.raises(TargetError, match=r"^expected .*127\.0\.0\.1:1"):
         run(asked(url))
@@ -250,14 +255,14 @@ def test_what_is_no_address_is_refused(url):
         address(url)
 
 
-@pytest.mark.parametrize("url", ["ftp://host:1", "oip+http://host:1"])
+@pytest.mark.parametrize("url", ["ftp://host:1", "oip+http://host:1", "oip+grpc://host:1"])
 def test_an_unknown_protocol_or_a_missing_model_is_refused(url):
     with pytest.raises(SettingsError, match=r"^expected a (target that begins|model)"):
         target_at(address(url))
 
 
 def test_keys_that_cannot_be_read_are_refused(tmp_path):
-    for url in ("grpcs://127.0.0.1:1", "https://127.0.0.1:1"):
+    for url in ("grpcs://127.0.0.1:1", "https://127.0.0.1:1", "oip+grpcs://127.0.0.1:1/m"):
         with pytest.raises(FileError, match="PEM"):
             run(target_at(address(url, ca=tmp_path / "none.pem")).open())
 
@@ -269,7 +274,7 @@ def test_an_error_that_only_a_newer_service_knows_counts_as_one():
 
 def test_a_stream_that_breaks_is_opened_again():
     async def twice(doors):
-        async with opened(both(doors)["stream"]) as (target, _):
+        async with opened(urls(doors)["stream"]) as (target, _):
             first = await target.send(target.encode(ONE), PATIENCE_S)
             for stream in target._streams:
                 stream.end()
@@ -280,7 +285,7 @@ def test_a_stream_that_breaks_is_opened_again():
 
 
 def test_problem_documents_are_quoted(doors):
-    (reply,) = run(asked(both(doors)["rest"], Request((CLUSTER[:1],))))
+    (reply,) = run(asked(urls(doors)["rest"], Request((CLUSTER[:1],))))
     problem = doors.rest.post(
         "/v1/recognise", content=CLUSTER[:1].tobytes(), headers={"Content-Type": "application/octet-stream"}
     )

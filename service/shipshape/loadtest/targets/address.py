@@ -41,7 +41,7 @@ class Address:
     @property
     def secure(self) -> bool:
         """Whether it wants TLS."""
-        return self.scheme in ("grpcs", "grpcs+stream", "https", "oip+https")
+        return self.scheme in ("grpcs", "grpcs+stream", "https", "oip+https", "oip+grpcs")
 
     @property
     def base_url(self) -> str:

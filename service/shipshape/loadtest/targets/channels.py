@@ -1,4 +1,6 @@
-"""Connections to shipshape.v1 over gRPC, and what its messages have in common."""
+"""Connections over gRPC, and what the messages of shipshape.v1 have in common."""
+
+from collections.abc import Awaitable, Callable
 
 import grpc
 
@@ -21,6 +23,7 @@ CONTACT_OUTCOMES = {
     pb.ERROR_KIND_DEADLINE_EXCEEDED: Outcome.EXPIRED,
     pb.ERROR_KIND_NOT_READY: Outcome.UNAVAILABLE,
 }
+Describe = Callable[[grpc.aio.Channel], Awaitable[TargetInfo]]
 
 
 class Channels:
@@ -32,32 +35,41 @@ class Channels:
         self.metadata = [("authorization", f"Bearer {token}")] if token else []
         self.all: list[grpc.aio.Channel] = []
 
-    async def open(self) -> TargetInfo:
-        """Connect them all; raises TargetError when nobody answers, or in another protocol."""
+    async def open(
+        self, protocol: str, describe: Callable[[grpc.aio.Channel], Awaitable[TargetInfo]]
+    ) -> TargetInfo:
+        """Connect them all, and ask on each what the target is.
+
+        Raises:
+            TargetError: Nobody answers, or not in `protocol`.
+        """
         self.all = [_channel(self._address) for _ in range(self._address.connections)]
         try:
             # The first byte on each connection: what is timed later meets none that is still being opened.
-            infos = [await self._model_info(channel) for channel in self.all]
+            infos = [await describe(channel) for channel in self.all]
         except grpc.aio.AioRpcError as error:
             await self.close()
             where = f"{self._address.scheme}://{self._address.host}"
             raise TargetError(
-                f"expected shipshape.v1 at {where}, got {error.code().name}: {error.details()}"
+                f"expected {protocol} at {where}, got {error.code().name}: {error.details()}"
             ) from error
-        info = infos[0]
-        return TargetInfo(info.version, info.bundle_name, info.bundle, info.limits.budget_ms)
+        return infos[0]
+
+    async def open_shipshape(self) -> TargetInfo:
+        """As `open`, of the typed service."""
+        return await self.open("shipshape.v1", self._model_info)
 
     async def close(self) -> None:
         """Disconnect."""
         for channel in self.all:
             await channel.close(None)
 
-    async def _model_info(self, channel: grpc.aio.Channel) -> pb.GetModelInfoResponse:
+    async def _model_info(self, channel: grpc.aio.Channel) -> TargetInfo:
         ask = ShipshapeStub(channel).GetModelInfo  # type: ignore[no-untyped-call]
         info: pb.GetModelInfoResponse = await ask(
             pb.GetModelInfoRequest(), timeout=CONNECT_S, metadata=self.metadata
         )
-        return info
+        return TargetInfo(info.version, info.bundle_name, info.bundle, info.limits.budget_ms)
 
 
 def contacts_of(request: Request) -> list[pb.Contact]:

@@ -35,7 +35,7 @@ class GrpcTarget:
 
     async def open(self) -> TargetInfo:
         """As `Target.open`."""
-        info = await self._channels.open()
+        info = await self._channels.open_shipshape()
         self._calls = itertools.cycle([_calls(channel) for channel in self._channels.all])
         return info
 

@@ -5,6 +5,7 @@ each has. Of the outputs, where they are there: `rung` tells full answers from d
 contact got none, and `detail` says it in words.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,8 @@ class OipTarget:
     """v2/models/MODEL/infer."""
 
     def __init__(self, address: Address) -> None:
-        if not address.path:
-            raise SettingsError(f"expected a model, as in {address.scheme}://{address.host}/shipshape, got none")
         self._address = address
-        self._model = f"/v2/models/{address.path}"
+        self._model = f"/v2/models/{model_of(address)}"
 
     async def open(self) -> TargetInfo:
         """As `Target.open`."""
@@ -57,8 +56,19 @@ class OipTarget:
         await self._client.close()
 
 
+def model_of(address: Address) -> str:
+    """The model that a target names; raises SettingsError when it names none."""
+    if not address.path:
+        raise SettingsError(f"expected a model, as in {address.scheme}://{address.host}/shipshape, got none")
+    return address.path
+
+
 def _of_answer(answer: dict[str, Any]) -> Reply:
-    outputs = {output["name"]: output["data"] for output in answer["outputs"]}
+    return of_outputs({output["name"]: output["data"] for output in answer["outputs"]})
+
+
+def of_outputs(outputs: Mapping[str, list[str]]) -> Reply:
+    """How an answer counts, by the texts of its outputs; raises ValueError where they are not a contact's each."""
     errors = outputs.get("error", [])
     details = outputs.get("detail", [""] * len(errors))
     failed = [of_contact_error(kind, detail) for kind, detail in zip(errors, details, strict=True) if kind]

@@ -32,7 +32,7 @@ class StreamTarget:
 
     async def open(self) -> TargetInfo:
         """As `Target.open`."""
-        info = await self._channels.open()
+        info = await self._channels.open_shipshape()
         self._streams = [Stream(channel, self._channels.metadata) for channel in self._channels.all]
         self._turns = itertools.cycle(self._streams)
         return info
