@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from shipshape.batch import inputs as inputs_module
 from shipshape.batch import progress
 from shipshape.batch.inputs import Inputs
 from shipshape.batch.progress import Watch, progress_of
@@ -54,3 +55,19 @@ def test_a_terminal_sees_contacts_rate_and_time_left(inputs, monkeypatch):
         tell(part(first.sha256, 0.5))
     assert "5 contacts" in screen.getvalue()
     assert "%" in screen.getvalue()
+
+
+def test_it_says_which_input_is_hashed(inputs, monkeypatch):
+    watch, seen = Watch(inputs), []
+    digest = inputs_module._digest
+
+    def watched(path: Path) -> str:
+        seen.append(str(watch))
+        return digest(path)
+
+    monkeypatch.setattr(inputs_module, "_digest", watched)
+    names = [source.path.name for source in inputs.sources()]
+    assert names == ["a.npy", "b.npy"]
+    assert [line.rpartition("/")[2] for line in seen] == ["a.npy", "b.npy", "copy.npy"]
+    assert all(line.startswith("0 contacts, hashing ") for line in seen)
+    assert "hashing" not in str(watch)

@@ -28,7 +28,11 @@ class InputRecord:
 
 
 class Inputs:
-    """The inputs of one run, in its order."""
+    """The inputs of one run, in its order.
+
+    Attributes:
+        hashing: Name of the one that is read for its digest just now: a large one takes a while; else empty.
+    """
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = list(paths)
@@ -38,6 +42,7 @@ class Inputs:
                 record.size = _size(path)
             except OSError as error:
                 record.error = f"expected to read {record.name}, got: {error.strerror or error}"
+        self.hashing = ""
         self._of: dict[str, InputRecord] = {}
 
     @property
@@ -55,10 +60,13 @@ class Inputs:
                 record.error = f"expected a file ending in {' '.join([*FILES, *RECORDINGS])}, got {path.name}"
                 continue
             try:
+                self.hashing = record.name
                 record.sha256 = _digest(path)
             except OSError as error:
                 record.error = f"expected to read {record.name}, got: {error.strerror or error}"
                 continue
+            finally:
+                self.hashing = ""
             first = self._of.setdefault(record.sha256, record)
             if first is not record:
                 record.same_as = first.name

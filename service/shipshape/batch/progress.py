@@ -1,4 +1,4 @@
-"""One line on the terminal while a run goes on: bytes read, contacts, contacts a second, time left."""
+"""One line on the terminal while a run goes on: bytes read, contacts, how fast or what is hashed, time left."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -44,6 +44,8 @@ class Watch:
             self._shares[item.sha256] = 1.0
 
     def __str__(self) -> str:
+        if self._inputs.hashing:
+            return f"{self.contacts} contacts, hashing {self._inputs.hashing}"
         rate = self.contacts / max(time.monotonic() - self._started, 1e-3)
         return f"{self.contacts} contacts  {rate:.0f}/s"
 
