@@ -188,6 +188,18 @@ def test_urgent_work_overtakes_between_two_stages(executor, crew):
     assert all(ticket.result()["seen"] == ["first", "second"] for ticket in batch), "no stage ran twice"
 
 
+def test_what_workers_hold_ahead_counts_in_the_early_look(executor, crew):
+    executor.learn([(rung, 0.02) for rung in LADDER for _ in range(8)], 0.0)
+    executor.check(Lane.TRACKING, time.monotonic() + 0.01)  # nobody goes before it
+    held = executor.submit_all([task(crew, first="slow") for _ in range(4)])
+    assert not executor._queues, "all four were given to workers"
+    with pytest.raises(Overloaded):
+        executor.check(Lane.TRACKING, time.monotonic() + 0.01)
+    executor.check(Lane.TRACKING, time.monotonic() + START_PATIENCE)
+    for ticket in held:
+        ticket.cancel()
+
+
 def test_a_full_queue_refuses(executor, crew):
     held = executor.submit_all([task(crew, first="slow", lane=Lane.COLLISION) for _ in range(16)])
     with pytest.raises(Overloaded):

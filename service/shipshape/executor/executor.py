@@ -110,7 +110,7 @@ class Executor:
         if slack <= 0:
             raise DeadlineExceeded("expected an answer before the deadline, got a request that is already late")
         with self._lock:
-            if self._queues:
+            if self.load > 1.0:
                 check_wait(self._check_room(1, lane), slack)
 
     def rehearse(self, task: Task[W, R]) -> R:
