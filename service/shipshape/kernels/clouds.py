@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float32, Float64
-from numba import njit
+
+from shipshape.kernels.compiled import compiled
 
 
 class Extent(NamedTuple):
@@ -15,7 +16,7 @@ class Extent(NamedTuple):
     mean: Float64[np.ndarray, " 3"]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def extent(points: Float32[np.ndarray, "n 3"], bearing: float) -> Extent:
     """Extent along the horizontal axis at `bearing` (radians from +x), across it to the left, and along z."""
     cos, sin = np.float32(np.cos(bearing)), np.float32(np.sin(bearing))
@@ -34,7 +35,7 @@ def extent(points: Float32[np.ndarray, "n 3"], bearing: float) -> Extent:
 Place = tuple[float, float, float]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def into_frame(points: Float32[np.ndarray, "n 3"], yaw: float, origin: Place) -> Float32[np.ndarray, "n 3"]:
     """The points as seen in a frame with its origin at `origin`, turned about z by `yaw` radians."""
     cos, sin = np.float32(np.cos(yaw)), np.float32(np.sin(yaw))
@@ -48,7 +49,7 @@ def into_frame(points: Float32[np.ndarray, "n 3"], yaw: float, origin: Place) ->
     return seen
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def out_of_frame(points: Float32[np.ndarray, "n 3"], yaw: float, origin: Place) -> Float32[np.ndarray, "n 3"]:
     """The inverse of `into_frame`."""
     cos, sin = np.float32(np.cos(yaw)), np.float32(np.sin(yaw))

@@ -2,10 +2,11 @@
 
 import numpy as np
 from jaxtyping import Float32, Int64
-from numba import njit
+
+from shipshape.kernels.compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def farthest_points(points: Float32[np.ndarray, "n 3"], most: int) -> Int64[np.ndarray, " c"]:
     """Farthest point sampling: each index is of the point farthest from all that were taken before it.
 
@@ -26,7 +27,7 @@ def farthest_points(points: Float32[np.ndarray, "n 3"], most: int) -> Int64[np.n
     return chosen
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def in_ball(
     points: Float32[np.ndarray, "n 3"], centres: Float32[np.ndarray, "c 3"], radius: float, most: int
 ) -> Int64[np.ndarray, "c k"]:
@@ -49,7 +50,7 @@ def in_ball(
     return members
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def describe_groups(
     points: Float32[np.ndarray, "n 3"],
     centres: Float32[np.ndarray, "c 3"],

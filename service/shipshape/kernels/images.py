@@ -2,10 +2,11 @@
 
 import numpy as np
 from jaxtyping import Float32, Int32, UInt8
-from numba import njit
+
+from shipshape.kernels.compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def rasterise(
     points: Float32[np.ndarray, "n 3"],
     axes: tuple[int, int, int],
@@ -61,7 +62,7 @@ def rasterise(
     return count, top, bottom, offset
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def stack_planes(
     count: Int32[np.ndarray, "layers rows columns"],
     top: Float32[np.ndarray, "layers rows columns"],
@@ -79,7 +80,7 @@ def stack_planes(
     return planes
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def grey_levels(
     occupied: np.ndarray,  # bool (layers, rows, columns)
     depth: Float32[np.ndarray, "layers rows columns"],
@@ -98,7 +99,7 @@ def grey_levels(
     return grey
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def lift_columns(
     occupied: np.ndarray,  # bool (layers, rows, columns): cells to lift
     surface: tuple[Float32[np.ndarray, "layers rows columns"], Float32[np.ndarray, "layers rows columns"]],

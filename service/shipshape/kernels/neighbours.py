@@ -2,14 +2,14 @@
 
 import numpy as np
 from jaxtyping import Float32, Int32
-from numba import njit
 
 from shipshape.kernels.clouds import extent
+from shipshape.kernels.compiled import compiled
 
 _MOST_SLABS = 1 << 16  # bounds memory; longer clouds get thicker slabs
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def count_neighbours(points: Float32[np.ndarray, "n 3"], radius: float) -> Int32[np.ndarray, " n"]:
     """How many other points lie within `radius` of each point: n_i = |{j != i: |p_i - p_j| <= r}|.
 
@@ -30,7 +30,7 @@ def count_neighbours(points: Float32[np.ndarray, "n 3"], radius: float) -> Int32
     return counts
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _count_within(
     point: tuple[np.float32, np.float32, np.float32],
     near: tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]],
@@ -45,7 +45,7 @@ def _count_within(
     return found
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _sort_into_slabs(
     points: Float32[np.ndarray, "n 3"], radius: float
 ) -> tuple[Int32[np.ndarray, " slabs+1"], Int32[np.ndarray, " n"]]:
@@ -69,7 +69,7 @@ def _sort_into_slabs(
     return start, order
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def select_spread(
     points: Float32[np.ndarray, "n 3"], scores: Int32[np.ndarray, " n"], spacing: float, limit: int
 ) -> Int32[np.ndarray, " k"]:
@@ -94,7 +94,7 @@ def select_spread(
     return chosen[:taken]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _ranks_before(
     points: Float32[np.ndarray, "n 3"], scores: Int32[np.ndarray, " n"], first: int, second: int
 ) -> bool:
@@ -106,7 +106,7 @@ def _ranks_before(
     return False
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _is_clear(points: Float32[np.ndarray, "n 3"], i: int, chosen: Int32[np.ndarray, " k"], spacing: float) -> bool:
     """Whether point i is none of the chosen and at least `spacing` from each."""
     for j in chosen:

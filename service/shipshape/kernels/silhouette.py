@@ -2,12 +2,13 @@
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int32
-from numba import njit
+
+from shipshape.kernels.compiled import compiled
 
 _LEAST_HEIGHT = 0.01  # m, of a column that holds anything
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _silhouette(
     points: Float32[np.ndarray, "n 3"],
     marked: Bool[np.ndarray, " n"],
@@ -37,7 +38,7 @@ def _silhouette(
     return top, found
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def missing_share(
     points: Float32[np.ndarray, "n 3"],
     measured: Bool[np.ndarray, " n"],

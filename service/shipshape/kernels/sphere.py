@@ -4,8 +4,10 @@ import numpy as np
 from jaxtyping import Float32, Int32
 from numba import njit
 
+from shipshape.kernels.compiled import compiled
 
-@njit(cache=True, nogil=True)
+
+@compiled
 def bin_spherically(
     points: Float32[np.ndarray, "n 3"],
     centres: Float32[np.ndarray, "k 3"],
@@ -53,7 +55,7 @@ def bin_spherically(
     return count, nearest, farthest
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(nogil=True, inline="always")
 def _elevation_row(sine: float, sines: Float32[np.ndarray, " edges"]) -> int:
     """How many of the descending `sines` are above `sine`: the row, zenith first."""
     low, high = 0, len(sines)
@@ -66,7 +68,7 @@ def _elevation_row(sine: float, sines: Float32[np.ndarray, " edges"]) -> int:
     return low
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(nogil=True, inline="always")
 def _azimuth_column(dx: float, dy: float, tangents: Float32[np.ndarray, " edges"]) -> int:
     """Column of the azimuth of (dx, dy), from -pi, with `edges` + 1 columns in each quarter turn."""
     quarter = len(tangents) + 1
