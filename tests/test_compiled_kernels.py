@@ -28,4 +28,4 @@ def test_a_full_disk_costs_the_next_start_seconds_and_not_this_one_its_life(tmp_
     assert ran(tmp_path, 0).count("compiled kernels are not kept") == 1
     assert not list(tmp_path.rglob("*.nbc"))
     assert ran(tmp_path, -1) == ""
-    assert list(tmp_path.rglob("extent-*.nbc"))
+    assert list(tmp_path.rglob("clouds.extent-*.nbc"))
