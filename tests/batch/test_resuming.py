@@ -202,6 +202,8 @@ def runs_in(process: psutil.Process, group: int) -> bool:
         return False
 
 
+# Ctrl-C may come between the opening of a file and the block that closes it.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_ctrl_c_ends_a_run_that_can_go_on(inputs, tmp_path, engine, monkeypatch):
     calls = 0
     answers = engine.answers

@@ -21,12 +21,14 @@ def state(page, said):
 def test_a_lost_connection_is_shown_and_comes_back(opened):
     with start("-c", SERVE_FAKES) as process, start_page(opened, process) as (page, port):
         state(page, "Ready")
+        sample = page.get_by_role("button", name=re.compile("RHIB"), include_hidden=True)
+        expect(sample).to_be_attached()  # it has come from the service, which is about to go
         stopped_by(process, signal.SIGTERM)
         lost = page.get_by_role("alert").filter(has_text="No connection to the service since")
         expect(lost).to_be_visible()
         state(page, "No connection")
         page.get_by_role("link", name="Bench").click()
-        page.get_by_role("button", name=re.compile("RHIB")).click()
+        sample.click()
         expect(page.locator("#problem")).to_contain_text("expected an answer from the service, got none")
         with start("-c", SERVE_FAKES, SHIPSHAPE_REST_PORT=str(port)) as again:
             until_ready(again)

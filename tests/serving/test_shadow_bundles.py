@@ -192,7 +192,7 @@ def test_the_old_bundle_stays_for_a_rollback_and_the_promoted_one_has_the_worker
     ask(doors)
     assert not any(gone(worker) for worker in before + workers)
     os.kill(workers[0].pid, signal.SIGKILL)
-    until(lambda: gone(workers[0]))
+    until(lambda: workers[0] not in processes_of(models.running.model))
     until(lambda: doors.service.executor.sound)
     assert ask(doors)[0] == models.running.model.bundle.digest
 
