@@ -1,6 +1,6 @@
 /** The page: which view is shown, whether the service is there, and one beat a second. */
 
-import { clearProblem, paintBench, startBench } from "./bench/bench";
+import { paintBench, recoverBench, startBench } from "./bench/bench";
 import type { Model } from "./contract";
 import { byId, make, write } from "./dom";
 import { paintLive, readLive, showLive, showModel } from "./live/live";
@@ -38,7 +38,7 @@ async function beat(): Promise<void> {
   clearTimeout(waiting);
   try {
     await look();
-    if (lostAt) clearProblem(); // it told of the connection that is back
+    if (lostAt) recoverBench();
     lostAt = null;
     byId("lost").hidden = true;
   } catch (error) {

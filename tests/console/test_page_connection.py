@@ -38,6 +38,20 @@ def test_a_lost_connection_is_shown_and_comes_back(opened):
             stopped_by(again, signal.SIGTERM)
 
 
+def test_samples_that_were_missed_come_with_the_connection(opened, browser):
+    with running() as doors, opened(f"http://127.0.0.1:{doors.addresses.rest_port}/", "bench") as page:
+        page.route("**/samples.json", lambda route: route.abort())
+        page.reload()
+        expect(page.locator("#problem")).to_contain_text("expected an answer from the service, got none")
+        page.unroute("**/samples.json")
+        page.route("**/readyz", lambda route: route.abort())
+        state(page, "No connection")
+        page.unroute("**/readyz")
+        state(page, "Ready")
+        expect(page.get_by_role("button", name=re.compile("RHIB"))).to_be_visible()
+        expect(page.locator("#problem")).to_be_hidden()
+
+
 @contextmanager
 def start_page(opened, process):
     """The live view of a service that has just been started, and the port it got."""

@@ -52,9 +52,18 @@ export function paintBench(): void {
   repaint();
 }
 
-/** Takes back the last complaint. */
-export function clearProblem(): void {
+/** The connection is back: what told of its loss goes, and what was missed comes. */
+export function recoverBench(): void {
+  clearProblem();
+  if (!byId("samples").childElementCount) offerSamples();
+}
+
+function clearProblem(): void {
   byId("problem").hidden = true;
+}
+
+function offerSamples(): void {
+  showSamples((sample) => choose(sample), showProblem).catch(showProblem);
 }
 
 function startChoosing(): void {
@@ -83,7 +92,7 @@ function startChoosing(): void {
   byId<HTMLSelectElement>("cluster").addEventListener("change", (event) => {
     chooseOfFile(Number((event.target as HTMLSelectElement).value));
   });
-  showSamples((sample) => choose(sample), showProblem).catch(showProblem);
+  offerSamples();
 }
 
 async function openFile(file: File): Promise<void> {

@@ -24,7 +24,7 @@ export async function showSamples(
   choose: (cluster: Cluster) => void,
   complain: (error: unknown) => void,
 ): Promise<void> {
-  for (const sample of await json<Sample[]>(`${FOLDER}/samples.json`)) {
+  const buttons = (await json<Sample[]>(`${FOLDER}/samples.json`)).map((sample) => {
     const title = make("strong", {}, sample.title);
     const button = make("button", { type: "button" }, title, make("span", { className: "quiet" }, sample.text));
     button.addEventListener("click", async () => {
@@ -36,8 +36,9 @@ export async function showSamples(
         complain(error);
       }
     });
-    byId("samples").append(button);
-  }
+    return button;
+  });
+  byId("samples").replaceChildren(...buttons);
 }
 
 async function read({ file, title, sensor_height_m }: Sample): Promise<Cluster> {
