@@ -4,14 +4,19 @@ import argparse
 import http.client
 import json
 import sys
+import threading
+import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from shipshape.errors import SettingsError
 from shipshape.token_file import read_token
 
 OK, REFUSED = 0, 1
 PATIENCE_S = 120.0  # a swap loads and tries a whole bundle, on a loaded machine
+TICK_S = 1.0  # between two looks at the clock for somebody who waits
 NEXT = "is --url the address of the service's SHIPSHAPE_ADMIN_PORT?"
 CALLS = {
     "status": ("GET", "/admin/status"),
@@ -36,8 +41,9 @@ def admin(arguments: argparse.Namespace) -> int:
     # No proxy: the door is on loopback, and whatever the environment names would learn the token.
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
-        with opener.open(request, timeout=PATIENCE_S) as response:
-            print(json.dumps(json.load(response), indent=2))
+        with _counted(arguments.call), opener.open(request, timeout=PATIENCE_S) as response:
+            answer = json.load(response)
+        print(json.dumps(answer, indent=2))
     except urllib.error.HTTPError as error:
         with error:
             return _failed(_detail(error))
@@ -48,6 +54,29 @@ def admin(arguments: argparse.Namespace) -> int:
     except (http.client.HTTPException, ValueError) as error:
         return _failed(f"expected an admin door at {arguments.url}, got {type(error).__name__}: {NEXT}")
     return OK
+
+
+@contextmanager
+def _counted(call: str) -> Iterator[None]:
+    """The seconds that a call takes, where somebody looks on."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    started, ended = time.monotonic(), threading.Event()
+
+    def count() -> None:
+        """Write them over each other."""
+        while not ended.wait(TICK_S):
+            print(f"\r{call}: {time.monotonic() - started:.0f} s", end="", file=sys.stderr, flush=True)
+
+    counting = threading.Thread(target=count, daemon=True)
+    counting.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        counting.join()
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
 def _url(given: str) -> str:

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import socket
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -11,6 +12,7 @@ import pytest
 
 from serving.fakes import DIGEST, PATIENCE, FakePipeline, cluster, fake_model, running
 from serving.http_calls import read
+from shipshape import admin_calls
 from shipshape.cli import main
 from shipshape.errors import BundleError, InvalidInput, SettingsError
 from shipshape.serving.admin.control import folder_below
@@ -226,6 +228,16 @@ def test_the_command_line(both, tmp_path, capsys):
     capsys.readouterr()
     assert call(admin, tmp_path, "swap", "bad") == 1
     assert capsys.readouterr().err == "shipshape: expected sha256 1 of prior.onnx, got 2\n"
+
+
+def test_who_waits_at_a_terminal_sees_the_seconds(both, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(admin_calls, "TICK_S", 1e-4)
+    assert call(both[1], tmp_path, "swap", "second") == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["bundle"]["name"] == "other"
+    assert said.err.startswith("\rswap: 0 s")
+    assert said.err.endswith("\r\033[K")
 
 
 def test_the_command_line_without_a_door_or_a_token(tmp_path, capsys):
