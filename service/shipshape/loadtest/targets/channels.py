@@ -35,9 +35,7 @@ class Channels:
         self.metadata = [("authorization", f"Bearer {token}")] if token else []
         self.all: list[grpc.aio.Channel] = []
 
-    async def open(
-        self, protocol: str, describe: Callable[[grpc.aio.Channel], Awaitable[TargetInfo]]
-    ) -> TargetInfo:
+    async def open(self, protocol: str, describe: Describe) -> TargetInfo:
         """Connect them all, and ask on each what the target is.
 
         Raises:
@@ -100,8 +98,11 @@ def of_error(error: pb.ContactError) -> Reply:
 
 
 def _channel(address: Address) -> grpc.aio.Channel:
-    # Channels to one address share one connection unless they are told not to.
-    options = [("grpc.use_local_subchannel_pool", 1), ("grpc.enable_http_proxy", 0)]
+    options = [
+        ("grpc.use_local_subchannel_pool", 1),  # channels to one address share one connection unless told not to
+        ("grpc.enable_http_proxy", 0),
+        ("grpc.max_receive_message_length", -1),  # the answer to a scan may be over gRPC's 4 MiB
+    ]
     if address.secure:
         return grpc.aio.secure_channel(address.host, _credentials(address.keys), options)
     return grpc.aio.insecure_channel(address.host, options)
