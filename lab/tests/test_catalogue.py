@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from hulls import box_hull
 
+pytest.importorskip("torch", reason="training needs torch, which only `make torch` installs")
+
 from shipshape.types import ImageMethod
 from shipshape_lab.simulator import clusters, datasets
 from shipshape_lab.simulator.catalogue import DEFAULT, read_catalogue, same_vessels

@@ -86,6 +86,7 @@ def test_the_keyboard_is_enough(opened, address):
         press(page, "Shift+Tab", until="Bench")
         page.keyboard.press("Enter")
         expect(page.get_by_role("heading", name="Bench")).to_be_visible()
+        expect(page.get_by_role("button", name=re.compile("RHIB"))).to_be_visible()
         press(page, "Tab", until="RHIB", at=re.match)
         assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
         page.keyboard.press("Enter")
