@@ -75,4 +75,4 @@ def missing_share(restored: RestoredCloud, bearing: float, waterline: float) -> 
     """
     count = min(max(int(np.count_nonzero(restored.measured)) // _POINTS_A_COLUMN, _FEWEST_COLUMNS), _MOST_COLUMNS)
     # Preset paper: the whole cluster may lie outside its image, and then all is missing.
-    return float(kernels.missing_share(restored.points_level, restored.measured, bearing, float(waterline), count))
+    return kernels.missing_share(restored.points_level, restored.measured, bearing, float(waterline), count)
