@@ -203,7 +203,7 @@ def runs_in(process: psutil.Process, group: int) -> bool:
 
 
 # Ctrl-C may come between the opening of a file and the block that closes it.
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.filterwarnings("ignore:Exception ignored in. <_io.FileIO:pytest.PytestUnraisableExceptionWarning")
 def test_ctrl_c_ends_a_run_that_can_go_on(inputs, tmp_path, engine, monkeypatch):
     calls = 0
     answers = engine.answers
