@@ -9,6 +9,8 @@ from shipshape.executor.lanes import Lane, places
 
 HEADROOM = 1.25  # over the predicted time: costs are means, and half of all work takes longer
 QUEUE_HEADROOM = 1.5  # over that of a queue: when much is asked, the doors take more of the cores
+AHEAD_S = 0.040  # of work that a worker is given at a time; it takes turns there, and the first ends with the last
+STANDING_S = 0.250  # without a moment of rest, after which a queue is no burst that will soon be over
 
 
 def settle_rungs(entries: Sequence[Entry], costs: Costs, *, wait: float, slack: float, workers: int) -> None:
@@ -58,6 +60,15 @@ def check_room(wanted: int, lane: Lane, *, limit: int, depth: int, wait: float) 
             f"expected at most {room} more in the queue of {limit}, got {wanted}",
             retry_after_s=wait * min(1.0, (wanted - room) / max(1, depth)),
         )
+
+
+def behind(seconds: float, busy_s: float) -> float:
+    """Seconds that new work will wait behind so many seconds of work, when no worker rested for `busy_s`.
+
+    A queue that stands is kept short: being long it would make everybody late and nobody more in time, and leave
+    its work no time to take turns with what comes behind it.
+    """
+    return seconds + min(seconds, AHEAD_S) if busy_s > STANDING_S else seconds
 
 
 def check_wait(wait: float, slack: float) -> None:

@@ -144,9 +144,9 @@ class ThreadHand(Hand):
         """As `Mailbox.others_wait`."""
         return self._crew.others_wait()
 
-    def ended(self, entry: Entry) -> None:
+    def ended(self, entries: Sequence[Entry]) -> None:
         """As `Mailbox.ended`."""
-        self._crew.on_end(self, [entry])
+        self._crew.on_end(self, entries)
 
     def close(self) -> None:
         """Nothing more will be given."""

@@ -13,6 +13,7 @@ class Entry:
         left: Seconds that the stages ahead will probably take.
         since: When it began to wait.
         began: When a worker first took it up; None before.
+        busy: Seconds that a worker gave to it so far.
         over: Its worker has nothing more to do with it.
         hand: The worker that it was given to; None while it waits in the queue.
         timed: What was timed since the costs were last learned from it, with seconds.
@@ -24,6 +25,7 @@ class Entry:
         "_stages",
         "_why",
         "began",
+        "busy",
         "hand",
         "left",
         "over",
@@ -37,7 +39,7 @@ class Entry:
     def __init__(self, task: Task[Any, Any], clock: Clock) -> None:
         self.task = task
         self.ticket: Ticket[Any] = Ticket(task.deadline, clock)
-        self.left = self.since = 0.0
+        self.left = self.since = self.busy = 0.0
         self.began: float | None = None
         self.over = False
         self.hand: object = None

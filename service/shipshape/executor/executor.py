@@ -14,7 +14,7 @@ from operator import itemgetter
 from typing import Any
 
 from shipshape.errors import DeadlineExceeded, NotReady
-from shipshape.executor.admission import check_room, check_wait, settle_rungs, with_headroom
+from shipshape.executor.admission import behind, check_room, check_wait, settle_rungs, with_headroom
 from shipshape.executor.costs import Costs
 from shipshape.executor.counts import Counts
 from shipshape.executor.crew import Crew, Hand, ThreadCrew
@@ -23,9 +23,6 @@ from shipshape.executor.entry import Entry
 from shipshape.executor.lanes import Lane, Queues
 from shipshape.executor.ticket import Clock, R, Rung, Task, Ticket, W
 from shipshape.executor.worker import rehearse
-
-StageObserver = Callable[[str, float], None]  # stage name, seconds; called for every outcome
-WaitObserver = Callable[[Lane, float], None]  # lane, seconds in the queue
 
 
 class Executor:
@@ -45,8 +42,8 @@ class Executor:
         queue_limit: int,
         *,
         clock: Clock = time.monotonic,
-        on_stage: StageObserver = lambda name, seconds: None,
-        on_wait: WaitObserver = lambda lane, seconds: None,
+        on_stage: Callable[[str, float], None] = lambda name, seconds: None,
+        on_wait: Callable[[Lane, float], None] = lambda lane, seconds: None,
     ) -> None:
         self.clock = clock
         self.queue_limit = queue_limit
@@ -57,6 +54,7 @@ class Executor:
         self._queues: Queues[Entry] = Queues()
         self._costs = Costs()
         self._crews: list[Crew] = []
+        self._rested = clock()  # when a worker without work last got some
         self._threads: ThreadCrew | None = None  # made for the first task that names no crew
         self._open = True
         self._counts = {spare: Counts() for spare in (False, True)}
@@ -146,10 +144,10 @@ class Executor:
             return with_headroom(self.wait(lane), sum(self._costs.each([*rung.stages, rung], size)))
 
     def wait(self, lane: Lane) -> float:
-        """Seconds until a worker will probably be free for new work of this lane."""
+        """Seconds that new work of this lane will probably wait."""
         with self._lock:
             given = sum(hand.seconds(lane, self.clock()) for hand in self._hands())
-            return (self._queues.seconds(lane) + given) / self.workers
+            return behind((self._queues.seconds(lane) + given) / self.workers, self.clock() - self._rested)
 
     @property
     def alive(self) -> bool:
@@ -251,6 +249,8 @@ class Executor:
                 *_, hand = min(rooms, key=itemgetter(0, 1))
                 self._queues.remove(lane, entry)
                 entry.hand = hand
+                if not hand.given:
+                    self._rested = self.clock()
                 hand.give(entry)
                 given.add(hand)
             for hand in given:

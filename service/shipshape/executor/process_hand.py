@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
+from shipshape.executor.admission import AHEAD_S
 from shipshape.executor.crew import WEDGED_S, Hand
 from shipshape.executor.entry import Entry
 from shipshape.executor.lanes import Lane, Queues
 from shipshape.executor.messages import Inbox, packed
 
-SOON_S = 0.030  # of work before it, at which an entry is given to a worker that is busy: it need not wait for us
-MOST = 12  # entries that it is given at a time
+MOST = 16  # entries that it is given at a time
 
 
 class ProcessHand(Hand):
@@ -62,7 +62,7 @@ class ProcessHand(Hand):
         if not self.alive:
             return None
         count = self._ahead.count(lane)
-        if count and (count >= MOST or self._ahead.seconds(lane) > SOON_S):
+        if count and (count >= MOST or self._ahead.seconds(lane) > AHEAD_S):
             return None
         return count
 

@@ -13,15 +13,10 @@ from typing import Any, NamedTuple, NoReturn
 from shipshape.errors import ShipshapeError
 from shipshape.executor.costs import Costs
 from shipshape.executor.entry import Entry
-from shipshape.executor.lanes import Lane
 from shipshape.executor.messages import Inbox, packed
 from shipshape.executor.ticket import Task
 from shipshape.executor.worker import Worker
 
-# For a report to be sent with the next, while there is more work: to be woken for each would cost the service, and
-# the worker on the same core, more than all that it then does.
-HOLD_S = 0.020
-HOLD_OF_WORK, HOLD_OF_SLACK = 0.5, 0.25  # at most, of the time that the work at hand will take; until the deadline
 NICE = 5  # on a busy core the doors go first: refusals are soon given, and answers soon sent
 LEARNED = 4  # one in so many entries is learned from: costs change slowly, and learning takes time
 
@@ -90,17 +85,12 @@ class SocketMailbox:
         self._prepared = prepared
         self._inbox = Inbox()
         self._ended = 0
-        self._free = 0.0  # when the last one ended
-        self._reports: list[bytes] = []  # that are not sent yet
-        self._send_at = 0.0
         self._numbers: dict[Entry, int] = {}  # of those that have not ended
         self._poll = select.poll()
         self._poll.register(connection, select.POLLIN)
 
     def read(self, *, wait: bool) -> Sequence[Entry] | None:
         """As `Mailbox.read`."""
-        if wait or (self._reports and time.monotonic() >= self._send_at):
-            self._send()
         if not wait and not self._poll.poll(0):
             return ()
         messages = self._inbox.receive(self._connection)
@@ -112,39 +102,22 @@ class SocketMailbox:
         """As `Mailbox.others_wait`: what it has not been given, it does not know of."""
         return False
 
-    def ended(self, entry: Entry) -> None:
+    def ended(self, entries: Sequence[Entry]) -> None:
         """As `Mailbox.ended`; the service learns the cost of a whole rung, this end that of its stages."""
-        number = self._numbers.pop(entry)
-        now = time.monotonic()
-        # Not the sum of its stages: what lies between them takes the worker's time as well.
-        took = now - max(self._free, now if entry.began is None else entry.began)
-        self._free = now
+        self._send([self._report(entry) for entry in entries])
+
+    def _report(self, entry: Entry) -> Report:
         self._ended += 1
         if self._ended % LEARNED == 0:
             for timed, seconds in entry.timed:
                 self._prepared.costs.learn(timed, entry.task.size, seconds)
         error = entry.ticket.future.exception()
         result = entry.ticket.future.result() if error is None else as_message(error)
-        urgent = entry.task.lane is Lane.COLLISION
-        here = sum(other.left for other in self._numbers)
-        hold = 0.0 if urgent else min(HOLD_S, HOLD_OF_WORK * here, HOLD_OF_SLACK * (entry.task.deadline - now))
-        self._tell(Report(number, result, entry.place, entry.stage_ms, entry.began, took), now + hold)
+        number = self._numbers.pop(entry)
+        return Report(number, result, entry.place, entry.stage_ms, entry.began, entry.busy)
 
-    def _tell(self, report: Report, send_at: float = 0.0) -> None:
-        """Send a report, or hold it back until then while there is more work."""
-        try:
-            message = packed(tuple(report))  # of plain values: one comes with every entry
-        except Exception as error:  # an answer that cannot travel
-            message = packed(tuple(Report(report.number, as_message(error))))
-        self._send_at = min(self._send_at, send_at) if self._reports else send_at
-        self._reports.append(message)
-        if not self._numbers or self._send_at <= time.monotonic():
-            self._send()
-
-    def _send(self) -> None:
-        if self._reports:
-            self._connection.sendall(b"".join(self._reports))
-            self._reports.clear()
+    def _send(self, reports: Sequence[Report]) -> None:
+        self._connection.sendall(b"".join(map(_packed, reports)))
 
     def _taken(self, number: int, *given: Any) -> Entry | None:
         if not given:  # taken back
@@ -156,8 +129,15 @@ class SocketMailbox:
         try:
             entry = Entry(self._prepared.make(order, deadline), time.monotonic)
         except Exception as error:
-            self._tell(Report(number, as_message(error)))
+            self._send([Report(number, as_message(error))])
             return None
         entry.move_to(place, self._prepared.costs, why)
         self._numbers[entry] = number
         return entry
+
+
+def _packed(report: Report) -> bytes:
+    try:
+        return packed(tuple(report))  # of plain values: one comes with every entry
+    except Exception as error:  # an answer that cannot travel
+        return packed(tuple(Report(report.number, as_message(error))))

@@ -1,13 +1,16 @@
-"""One worker: takes entries from its mailbox and carries each through the stages of its rung, one at a time.
+"""One worker: takes entries from its mailbox and carries each through the stages of its rung.
 
 It runs in a thread of the service or in a process of its own; which of the two, only its mailbox knows. Between
 two stages it looks into the mailbox, gives way to more urgent work, drops what nobody wants any more, and takes
-the cheaper rung when the time left is too short for the one it is on.
+the cheaper rung when the time left is too short for the one it is on. Entries at hand take turns, a stage each
+(ADR 0025): the second finds the code and the weights of the stage in the caches of the processor.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from shipshape.executor.admission import QUEUE_HEADROOM
 from shipshape.executor.costs import Costs
 from shipshape.executor.entry import Entry
 from shipshape.executor.lanes import Queues
@@ -35,8 +38,8 @@ class Mailbox(Protocol):
         """Whether there is work for this worker that it has not been given yet."""
         ...
 
-    def ended(self, entry: Entry) -> None:
-        """Its ticket is settled, and nothing of it runs any more."""
+    def ended(self, entries: Sequence[Entry]) -> None:
+        """Their tickets are settled, and nothing of them runs any more."""
         ...
 
 
@@ -62,68 +65,96 @@ class Worker:
         self._clock = clock
         self._on_stage = on_stage
         self._queues: Queues[Entry] = Queues()
+        self._group: list[Entry] = []  # of one lane, taking turns
         self._open = True
         self._looked = 0.0  # when it last looked into the mailbox
+        self._spent_until = 0.0  # its time is counted as some entry's, or as nobody's
 
     def work(self) -> None:
         """Carry whatever comes."""
         while self._open or self._queues:
             if not self._queues:
                 self._take_in(wait=True)
-            if (taken := self._queues.take()) is not None:
-                lane, entry = taken
-                if self._carry(entry):
-                    self._queues.put_back(lane, entry, entry.left)
-                else:
-                    self._mailbox.ended(entry)
-                del taken, entry  # a waiting worker must not keep the last cluster alive
+            self._carry()
 
     def _take_in(self, *, wait: bool) -> None:
         came = self._mailbox.read(wait=wait)
         self._looked = self._clock()
+        if wait:
+            self._spent_until = self._looked
         if came is None:
             self._open = False
             return
         for entry in came:
             self._queues.append(entry.task.lane, entry, entry.left)
 
-    def _carry(self, entry: Entry) -> bool:
-        """Carry the task to its end, or drop it where nobody wants it any more; True when it has to give way."""
+    def _carry(self) -> None:
+        """Carry a group, a stage of each in turn, until all have ended or have to give way."""
+        self._take_group()
+        over: list[Entry] = []
+        while self._group:
+            entry = min(self._group, key=_stages_done)
+            if self._queues and self._queues.before(entry.task.lane):
+                self._put_back()
+                break
+            self._step(entry)
+            if entry.ticket.settled:
+                self._group.remove(entry)
+                over.append(entry)
+            if self._open and self._spent_until - self._looked >= self._mailbox.LOOK_S:
+                self._take_in(wait=False)
+        if over:
+            self._mailbox.ended(over)
+
+    def _take_group(self) -> None:
+        """The first entry, and those behind it in its lane that can take turns with it without being late."""
+        together, due, now = 0.0, math.inf, self._clock()
+        while (first := self._queues.first()) is not None:
+            lane, entry = first
+            together += entry.left
+            due = min(due, entry.ticket.deadline)
+            late = now + QUEUE_HEADROOM * together > due
+            if self._group and (late or lane is not self._group[0].task.lane):
+                break
+            self._queues.remove(lane, entry)
+            self._group.append(entry)
+
+    def _put_back(self) -> None:
+        while self._group:
+            entry = self._group.pop()
+            self._queues.put_back(entry.task.lane, entry, entry.left)
+
+    def _step(self, entry: Entry) -> None:
+        """The next stage of an entry, or its answer after the last, unless nobody wants it any more."""
+        since = self._spent_until
         if entry.began is None:
-            entry.began = self._clock()
+            entry.began = since
         try:
-            if self._run_stages(entry):
-                return True
-            if not entry.ticket.settled:
-                finish(entry, self._clock)
+            self._advance(entry)
         except Exception as error:
             entry.ticket.fail(error)
         except BaseException as error:  # SystemExit and the like must end neither the worker nor the waiter
             entry.ticket.fail(RuntimeError(f"a stage raised {error!r}"))
-        return False
+        self._spent_until = self._clock()
+        entry.busy += self._spent_until - since
 
-    def _run_stages(self, entry: Entry) -> bool:
-        """Until none is left, or the ticket is settled; True when the entry has to give way."""
-        clock, ticket, work = self._clock, entry.ticket, entry.task.work
-        now = clock()
-        while True:
-            slack = ticket.deadline - now
-            if slack <= 0 or entry.left > slack:
-                self._hurry(entry, slack)
-            if ticket.settled or (stage := entry.stage) is None:
-                return False
-            if self._queues and self._queues.before(entry.task.lane):
-                return True
-            try:
-                stage.run(work)
-            finally:
-                started, now = now, clock()
-                entry.passed(stage, now - started)
-                if self._on_stage is not None:
-                    self._on_stage(stage.name, now - started)
-            if now - self._looked >= self._mailbox.LOOK_S and self._open:
-                self._take_in(wait=False)
-                now = clock()
+    def _advance(self, entry: Entry) -> None:
+        started = self._clock()
+        slack = entry.ticket.deadline - started
+        if slack <= 0 or entry.left > slack:
+            self._hurry(entry, slack)
+        if entry.ticket.settled:
+            return
+        if (stage := entry.stage) is None:
+            finish(entry, self._clock)
+            return
+        try:
+            stage.run(entry.task.work)
+        finally:
+            seconds = self._clock() - started
+            entry.passed(stage, seconds)
+            if self._on_stage is not None:
+                self._on_stage(stage.name, seconds)
 
     def _hurry(self, entry: Entry, slack: float) -> None:
         """Go on on a cheaper rung, or not at all where that would only make others late as well."""
@@ -131,7 +162,11 @@ class Worker:
             entry.ticket.expire()
 
     def _others_wait(self) -> bool:
-        return bool(self._queues) or self._mailbox.others_wait()
+        return len(self._group) > 1 or bool(self._queues) or self._mailbox.others_wait()
+
+
+def _stages_done(entry: Entry) -> int:
+    return len(entry.stage_ms)
 
 
 def rehearse(task: Task[W, R], costs: Costs, clock: Clock) -> R:
