@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.serving import page, plot, summary, wires
+from benchmarks.serving.__main__ import main
 from benchmarks.serving.contacts import COUNT, POINTS, contacts
 from benchmarks.serving.processes import free_ports
 from benchmarks.serving.servers import SERVERS
@@ -78,6 +79,13 @@ def test_page_and_plot_are_made_of_what_there_is(tmp_path):
     assert "| mosec |" in page.page({"about.machine": "one", **numbers}, SERVERS, "command")
     plot.draw(numbers, SERVERS, tmp_path / "serving.png")
     assert (tmp_path / "serving.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_rounds_of_other_code_are_not_mixed_in(tmp_path, monkeypatch):
+    (tmp_path / "plan.txt").write_text("of code that is no more")
+    monkeypatch.setattr("sys.argv", ["serving", "--run", str(tmp_path)])
+    with pytest.raises(SystemExit, match=r"code that is no more, got Plan.*: choose another --run"):
+        main()
 
 
 def test_all_servers_are_sent_the_same_points(clusters):

@@ -92,11 +92,11 @@ def _plan(args: argparse.Namespace) -> Plan:
 
 
 def _keep_to(plan: Plan, run: Path) -> None:
-    """Rounds of one run folder are all of one plan."""
+    """Rounds of one run folder are all of one plan, and of the same code: else a median would be of neither."""
     run.mkdir(parents=True, exist_ok=True)
-    kept, text = run / "plan.txt", str(plan)
+    kept, text = run / "plan.txt", f"{plan} of code {code_commit()}"
     if kept.exists() and kept.read_text() != text:
-        raise SystemExit(f"expected the plan of {run}, {kept.read_text()}, got {text}: choose another --run")
+        raise SystemExit(f"expected the rounds of {run}, {kept.read_text()}, got {text}: choose another --run")
     kept.write_text(text)
 
 
