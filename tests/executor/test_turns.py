@@ -115,12 +115,12 @@ def test_a_group_gives_way_and_goes_on_where_it_was(yard):
     assert [answer(entry) for entry in group] == ["a: first, second", "b: first, second"], "no stage ran twice"
 
 
-def test_one_that_fails_ends_alone(yard):
+def test_one_that_fails_ends_alone_and_is_told_of_before_the_others_end(yard):
     def burst(work):
         raise ValueError("planned")
 
     bad, good = yard.entry("a", ladder=[Steps(Note("bad", burst))]), yard.entry("b")
-    assert yard.work([bad, good]) == [[bad, good]]
+    assert yard.work([bad, good]) == [[bad], [good]]
     with pytest.raises(ValueError, match="planned"):
         answer(bad)
     assert answer(good) == "b: first, second"

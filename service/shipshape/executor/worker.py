@@ -16,6 +16,8 @@ from shipshape.executor.entry import Entry
 from shipshape.executor.lanes import Queues
 from shipshape.executor.ticket import Clock, R, Task, W
 
+HOLD_S = 0.005  # that the end of an entry is kept back to be told with that of others: each time wakes somebody
+
 
 class Mailbox(Protocol):
     """Where a worker's entries come from, and where it says what became of them.
@@ -92,6 +94,7 @@ class Worker:
         """Carry a group, a stage of each in turn, until all have ended or have to give way."""
         self._take_group()
         over: list[Entry] = []
+        tell_at = 0.0
         while self._group:
             entry = min(self._group, key=_stages_done)
             if self._queues and self._queues.before(entry.task.lane):
@@ -100,7 +103,11 @@ class Worker:
             self._step(entry)
             if entry.ticket.settled:
                 self._group.remove(entry)
+                tell_at = tell_at if over else self._spent_until + HOLD_S
                 over.append(entry)
+            if over and self._spent_until >= tell_at:
+                self._mailbox.ended(over)
+                over = []
             if self._open and self._spent_until - self._looked >= self._mailbox.LOOK_S:
                 self._take_in(wait=False)
         if over:
