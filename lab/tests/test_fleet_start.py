@@ -61,7 +61,6 @@ def test_another_kind_of_network_is_refused(tmp_path):
         start.take_up(InpaintingNet(6, EDGES), start.layers_of(tmp_path / "aligned.onnx"), inputs)
 
 
-@pytest.mark.skipif(not ALIGNED.exists(), reason="the default bundle is not trained")
 def test_int8_becomes_float_again():
     layers = start.layers_of(ALIGNED)
     convolutions, linear = layers[torch.nn.Conv2d], layers[torch.nn.Linear]
